@@ -1,0 +1,2 @@
+//! The program `umbrage`.
+fn main() {}

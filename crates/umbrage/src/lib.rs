@@ -1,0 +1,40 @@
+//! Plans shadow maps with *known* error.
+//!
+//! From a camera, a light and the bounds of what casts and receives shadows, a [`Planner`]
+//! computes a [`Plan`]: for every shadow map its matrix, its resolution, the depth range it serves,
+//! planes to cull its casters with, and the aliasing error it has. A plan is inert data; a GPU
+//! renderer, the CPU reference or your own engine can execute it.
+//!
+//! The crate is pure: no GPU, no files, no `unsafe`, no global state, and no allocation in a steady
+//! frame. Same input, same output.
+//!
+//! # Conventions
+//!
+//! All of them, stated once:
+//!
+//! - World space is right-handed, +y up, in metres. Angles are radians. A light's direction is the
+//!   way its light *travels*.
+//! - A transform is named `dst_from_src`. Matrices multiply column vectors.
+//! - *Local space* is world space moved by a plan's [`origin`](Plan::origin), so that single
+//!   precision suffices far from the world's origin.
+//! - *Light space* has +y towards the light, z perpendicular to it in the plane of view direction and
+//!   light, on the viewer's forward side, and x = y × z (Wimmer et al. 2004, §3.4). For a spot light
+//!   this is the space after the light's own perspective.
+//! - *Shadow space* is (s, t, depth): s across and t along the warp's axis, both in [0, 1]; depth in
+//!   [0, 1] with 0 nearest the light. Texel (i, j) of a map of `res` texels has its centre at
+//!   ((i + ½)/res.x, (j + ½)/res.y).
+//! - Symbols are those of the papers: n, f for the near and far distance, φ for half a field of view,
+//!   θ for the angle between view and light direction, λ for the distance from the warp's centre of
+//!   projection to its near plane, μ for the warp's depth range.
+
+mod bounds;
+mod camera;
+mod error;
+mod light;
+mod plan;
+
+pub use bounds::{Aabb, Bounds, Plane};
+pub use camera::{Camera, ClipDepth, LookAt};
+pub use error::Error;
+pub use light::{Light, SpotLight};
+pub use plan::{Beam, MapError, Plan, Receiver, Rows, ShadowMap};

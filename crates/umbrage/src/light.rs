@@ -1,0 +1,68 @@
+use crate::error::{Error, check, check_position, unit};
+use glam::DVec3;
+
+/// A light that casts shadows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Parallel light, such as the sun's.
+    Directional {
+        /// The way the light travels; any non-zero length.
+        direction: DVec3,
+    },
+    /// A cone of light from one point.
+    Spot(SpotLight),
+}
+
+/// A cone of light from one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpotLight {
+    /// World space, metres.
+    pub position: DVec3,
+    /// Axis of the cone, the way the light travels; any non-zero length.
+    pub direction: DVec3,
+    /// Half the cone's opening angle, radians, in (0, 85°]. Nothing outside is lit.
+    pub half_angle_rad: f64,
+    /// Distance from the light, measured along the axis, at which shadows begin, metres, > 0.
+    /// Casters nearer than this are missed; receivers nearer than this get no shadow.
+    pub near: f64,
+    /// Distance along the axis at which light ends, metres, > `near`.
+    pub range: f64,
+}
+
+impl Light {
+    /// Unit vector from a world point towards the light. At a spot light's own position the
+    /// direction against its axis.
+    pub fn direction_to_light(&self, world_position: DVec3) -> DVec3 {
+        match self {
+            Self::Directional { direction } => -direction.normalize_or_zero(),
+            Self::Spot(spot) => (spot.position - world_position)
+                .try_normalize()
+                .unwrap_or_else(|| -spot.direction.normalize_or_zero()),
+        }
+    }
+
+    /// The same light with unit directions, or what is wrong with it.
+    pub(crate) fn checked(&self) -> Result<Self, Error> {
+        match *self {
+            Self::Directional { direction } => {
+                Ok(Self::Directional { direction: unit(direction, "light.direction")? })
+            }
+            Self::Spot(spot) => {
+                check_position(spot.position, "light.position")?;
+                let max = 85f64.to_radians();
+                check(
+                    spot.half_angle_rad > 0.0 && spot.half_angle_rad <= max,
+                    "light.half_angle_rad",
+                    || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
+                )?;
+                check(spot.near > 0.0 && spot.near.is_finite(), "light.near", || {
+                    format!("must be positive and finite, is {}", spot.near)
+                })?;
+                check(spot.range > spot.near && spot.range <= 1e12, "light.range", || {
+                    format!("must exceed light.near ({}) and be at most 1e12, is {}", spot.near, spot.range)
+                })?;
+                Ok(Self::Spot(SpotLight { direction: unit(spot.direction, "light.direction")?, ..spot }))
+            }
+        }
+    }
+}

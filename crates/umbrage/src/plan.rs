@@ -1,0 +1,212 @@
+use crate::bounds::{Aabb, Plane};
+use crate::camera::Camera;
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4Swizzles};
+
+/// What to render and how to look it up: the result of planning.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// World position of local space's origin, metres: the viewer's position.
+    pub origin: DVec3,
+    /// The maps. Their number depends on the options alone, never on camera or light.
+    pub maps: Vec<ShadowMap>,
+    /// Angle θ between view and light direction, radians, 0 ..= π. For spot lights at the middle of
+    /// what the camera sees in its light.
+    pub theta_rad: f64,
+}
+
+impl Plan {
+    /// Texels of all maps together.
+    pub fn texels(&self) -> u64 {
+        self.maps.iter().map(ShadowMap::texels).sum()
+    }
+
+    /// Storage factor S̄: texels that all maps need, per pixel of the image, for an error of 1
+    /// pixel per texel in s and in t (Lloyd et al. 2006, Eq. 12).
+    pub fn storage_factor(&self) -> f64 {
+        self.maps.iter().map(|m| m.storage_factor).sum()
+    }
+}
+
+/// The largest errors over the receivers that a map serves, pixels per texel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapError {
+    /// Largest m_s: across the warp.
+    pub max_s: f64,
+    /// Largest m_t: along the warp.
+    pub max_t: f64,
+    /// Largest error in the worst direction, σ_max of a texel's footprint over a pixel's width.
+    pub max: f64,
+}
+
+/// How rows of texels are spread over t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rows {
+    /// Evenly: the matrix says it all, any GPU can render the map.
+    Even,
+    /// By the logarithm of the warp's depth, the optimum of Wimmer et al. 2004, §4.2. No GPU
+    /// rasterises this; the CPU reference casts it.
+    Logarithmic {
+        /// Far over near distance of the warp frustum, (λ + μ)/λ, > 1.
+        ratio: f64,
+    },
+}
+
+impl Rows {
+    /// The t at which the warped row coordinate `row` in [0, 1] lies.
+    pub fn t_from_row(self, row: f64) -> f64 {
+        match self {
+            Self::Even => row,
+            Self::Logarithmic { ratio } => {
+                -(-row * ratio.ln()).exp_m1() * ratio / (ratio - 1.0)
+            }
+        }
+    }
+
+    /// The row coordinate in [0, 1] of `t`: the inverse of [`t_from_row`](Self::t_from_row).
+    pub fn row_from_t(self, t: f64) -> f64 {
+        match self {
+            Self::Even => t,
+            Self::Logarithmic { ratio } => {
+                -(-t * (ratio - 1.0) / ratio).max(-1.0).ln_1p() / ratio.ln()
+            }
+        }
+    }
+
+    /// d row / d t.
+    pub fn row_derivative(self, t: f64) -> f64 {
+        match self {
+            Self::Even => 1.0,
+            Self::Logarithmic { ratio } => {
+                let k = (ratio - 1.0) / ratio;
+                k / (1.0 - t * k) / ratio.ln()
+            }
+        }
+    }
+}
+
+/// One shadow map of a [`Plan`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShadowMap {
+    /// World position of local space's origin, metres; the same for all maps of a plan.
+    pub origin: DVec3,
+    /// Takes a homogeneous local point to (s, t, depth) after the divide. Receivers land in
+    /// [0, 1]³; casters between them and the light get depths below 0 and are clamped to 0. The
+    /// fourth coordinate is positive wherever the map applies.
+    pub shadow_from_local: DMat4,
+    /// Inverse of `shadow_from_local`.
+    pub local_from_shadow: DMat4,
+    /// How rows of texels are spread over t; even for all warps but `log`.
+    pub rows: Rows,
+    /// Texels in s and t. Both 0 if the map sees nothing ([`is_empty`](Self::is_empty)).
+    pub resolution: [u32; 2],
+    /// Range along the view direction that the map serves, metres.
+    pub split: [f64; 2],
+    /// Distance λ from the warp's centre of projection to its near plane, in light-space metres (for
+    /// spot lights: in units of the light's image plane at unit distance). `None`: no warp.
+    pub lambda: Option<f64>,
+    /// Largest errors over the receivers served.
+    pub error: MapError,
+    /// This map's share of [`Plan::storage_factor`].
+    pub storage_factor: f64,
+    /// What can cast into this map lies inside all of these half-spaces, in local space.
+    pub caster_planes: Vec<Plane>,
+    /// Local position of a spot light, from which the map's beams come; `None`: beams are parallel.
+    pub apex: Option<DVec3>,
+}
+
+/// The line of points that one (s, t) stands for, in world space, running away from the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam {
+    /// World position where the receivers' depth range begins.
+    pub origin: DVec3,
+    /// Unit vector away from the light.
+    pub direction: DVec3,
+    /// How far back from `origin` casters may lie, metres, ≥ 0; infinite for parallel light.
+    pub reach_back: f64,
+}
+
+/// A surface point as a shadow map sees it: all that a shadow test needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// Shadow coordinates (s, t) of the point, by the matrix alone (before [`Rows`]).
+    pub st: DVec2,
+    /// Depth of the point.
+    pub depth: f64,
+    /// Slope of the surface's plane in shadow space, ∂depth/∂(s, t). Perspective maps take planes to
+    /// planes, so this holds on the whole plane. Infinite where the surface is edge-on to the light.
+    pub slope: DVec2,
+}
+
+impl ShadowMap {
+    /// Whether the map serves no receivers; then it has no texels and costs nothing.
+    pub fn is_empty(&self) -> bool {
+        self.resolution.contains(&0)
+    }
+
+    /// Number of texels.
+    pub fn texels(&self) -> u64 {
+        u64::from(self.resolution[0]) * u64::from(self.resolution[1])
+    }
+
+    /// [`shadow_from_local`](Self::shadow_from_local) in single precision, for a GPU.
+    pub fn shadow_from_local_f32(&self) -> Mat4 {
+        self.shadow_from_local.as_mat4()
+    }
+
+    /// Takes a homogeneous world point to (s, t, depth) after the divide. Far from the world's
+    /// origin use [`shadow_from_local`](Self::shadow_from_local) instead.
+    pub fn shadow_from_world(&self) -> DMat4 {
+        self.shadow_from_local * DMat4::from_translation(-self.origin)
+    }
+
+    /// (s, t, depth) of a world point; `None` where the map does not apply (behind the warp's
+    /// centre of projection or a spot light).
+    pub fn project(&self, world_position: DVec3) -> Option<DVec3> {
+        let h = self.shadow_from_local * (world_position - self.origin).extend(1.0);
+        (h.w > 0.0).then(|| h.xyz() / h.w)
+    }
+
+    /// The beam through (s, t). Slightly outside [0, 1]² is fine; `None` where no point has these
+    /// coordinates (beyond the warp's horizon).
+    pub fn beam(&self, st: DVec2) -> Option<Beam> {
+        let at = |depth: f64| {
+            let h = self.local_from_shadow * DVec4::new(st.x, st.y, depth, 1.0);
+            (h.w > 0.0).then(|| h.xyz() / h.w)
+        };
+        let [near, far] = [at(0.0)?, at(1.0)?];
+        let (direction, reach_back) = match self.apex {
+            None => ((far - near).try_normalize()?, f64::INFINITY),
+            Some(apex) => ((near - apex).try_normalize()?, near.distance(apex)),
+        };
+        Some(Beam { origin: near + self.origin, direction, reach_back })
+    }
+
+    /// A surface point with its plane, as the map sees it. `world_normal` need not have unit length
+    /// and may point to either side. `None` as for [`project`](Self::project).
+    pub fn receiver(&self, world_position: DVec3, world_normal: DVec3) -> Option<Receiver> {
+        let p = self.project(world_position)?;
+        // In shadow space the plane's covector is the world's times the inverse matrix.
+        let local = world_position - self.origin;
+        let plane = world_normal.extend(-world_normal.dot(local));
+        let shadow_plane = self.local_from_shadow.transpose() * plane;
+        let slope = -shadow_plane.xy() / shadow_plane.z;
+        Some(Receiver {
+            st: p.truncate(),
+            depth: p.z,
+            slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
+        })
+    }
+
+    /// Whether anything in `aabb` (world space) can cast a shadow into this map. Never `false` for
+    /// one that does; `true` for some that do not.
+    pub fn may_cast(&self, aabb: Aabb) -> bool {
+        let local = Aabb { min: aabb.min - self.origin, max: aabb.max - self.origin };
+        !self.is_empty() && self.caster_planes.iter().all(|p| p.may_touch(local))
+    }
+
+    /// Whether `camera`'s depth of this point lies in the range the map serves.
+    pub fn serves(&self, camera: &Camera, world_position: DVec3) -> bool {
+        let depth = camera.depth(world_position);
+        !self.is_empty() && (self.split[0]..=self.split[1]).contains(&depth)
+    }
+}
