@@ -4,8 +4,10 @@
 //! World space is right-handed, +y up, metres. Meshes are stored once, in single precision and
 //! their own space, and drawn by [`Instance`]s with double-precision transforms.
 
+mod texture;
 mod types;
 
 pub use types::{
     Alpha, Instance, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture, TextureId,
+    Wrap,
 };

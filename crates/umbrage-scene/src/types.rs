@@ -84,8 +84,20 @@ pub struct Texture {
     pub size: [u32; 2],
     /// Row by row from v = 0, red, green, blue, alpha.
     pub rgba: Vec<[u8; 4]>,
-    /// Whether u and v wrap around (else they are clamped).
-    pub repeat: [bool; 2],
+    /// What lies outside [0, 1], for u and for v.
+    pub wrap: [Wrap; 2],
+}
+
+/// How a texture goes on outside [0, 1].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// Again and again, glTF's default.
+    #[default]
+    Repeat,
+    /// Again and again, every second time mirrored.
+    Mirror,
+    /// With its edge pixels.
+    Clamp,
 }
 
 /// A camera of the scene. Its picture's size and, if not given, its aspect come from the user.
@@ -127,7 +139,10 @@ pub struct Notice(pub String);
 impl Scene {
     /// Triangles as drawn: each instance counts its mesh's.
     pub fn drawn_triangles(&self) -> u64 {
-        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len() as u64).sum()
+        self.instances
+            .iter()
+            .map(|i| self.meshes[i.mesh].triangles.len() as u64)
+            .sum()
     }
 
     /// Triangles as stored.
@@ -143,7 +158,9 @@ impl Scene {
             if b.is_empty() {
                 return all;
             }
-            all.union(Aabb::around(b.corners().map(|c| i.world_from_mesh.transform_point3(c))))
+            all.union(Aabb::around(
+                b.corners().map(|c| i.world_from_mesh.transform_point3(c)),
+            ))
         })
     }
 }
