@@ -4,9 +4,13 @@
 //! World space is right-handed, +y up, metres. Meshes are stored once, in single precision and
 //! their own space, and drawn by [`Instance`]s with double-precision transforms.
 
+mod builtin;
+mod error;
 mod texture;
 mod types;
 
+pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
+pub use error::SceneError;
 pub use types::{
     Alpha, Instance, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture, TextureId,
     Wrap,

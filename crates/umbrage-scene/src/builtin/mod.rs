@@ -1,0 +1,83 @@
+//! Scenes made by rule.
+
+pub mod closed_form;
+mod mesh_builder;
+mod stage;
+
+use crate::error::SceneError;
+use crate::types::Scene;
+
+/// A built-in scene, as lists show it.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct BuiltinInfo {
+    /// To ask for it by.
+    pub name: &'static str,
+    /// What it shows, in one sentence.
+    pub about: &'static str,
+    /// What the size counts.
+    pub size_means: &'static str,
+    /// Quick to build and worth looking at.
+    pub default_size: u32,
+    /// The largest, many millions of triangles drawn.
+    pub max_size: u32,
+    build: fn(u32) -> Scene,
+}
+
+const BUILTINS: &[BuiltinInfo] = &[
+    BuiltinInfo {
+        name: "pole",
+        about: "A square pole on a plane; its shadow has a closed form",
+        size_means: "quads along each edge of ground and pole",
+        default_size: 1,
+        max_size: 1000,
+        build: closed_form::pole,
+    },
+    BuiltinInfo {
+        name: "slit",
+        about: "A horizontal screen with a slit over a plane; its shadow has a closed form",
+        size_means: "quads along each edge of ground and screen",
+        default_size: 1,
+        max_size: 1000,
+        build: closed_form::slit,
+    },
+    BuiltinInfo {
+        name: "sphere",
+        about: "A sphere over a plane; its shadow is an ellipse",
+        size_means: "rings of the sphere from pole to pole",
+        default_size: 128,
+        max_size: 2000,
+        build: closed_form::sphere,
+    },
+];
+
+/// All built-in scenes.
+pub fn builtins() -> &'static [BuiltinInfo] {
+    BUILTINS
+}
+
+/// A built-in scene: deterministic, with its own camera and sun. `size` is 1 to
+/// [`BuiltinInfo::max_size`] and counts what [`BuiltinInfo::size_means`] says; `None` is
+/// [`BuiltinInfo::default_size`].
+///
+/// # Errors
+/// An unknown name (the error gives the nearest valid one) or a size out of range.
+pub fn builtin(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
+    let Some(info) = BUILTINS.iter().find(|b| b.name == name) else {
+        let distance = |b: &&BuiltinInfo| strsim::damerau_levenshtein(b.name, name);
+        let nearest = BUILTINS.iter().min_by_key(distance).map_or("", |b| b.name);
+        return Err(SceneError::UnknownBuiltin {
+            name: name.into(),
+            nearest,
+        });
+    };
+    let size = size.unwrap_or(info.default_size);
+    if !(1..=info.max_size).contains(&size) {
+        return Err(SceneError::BuiltinSize {
+            name: info.name,
+            size,
+            max: info.max_size,
+        });
+    }
+    Ok((info.build)(size))
+}

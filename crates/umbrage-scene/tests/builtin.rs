@@ -1,0 +1,198 @@
+//! The built-in scenes: sound geometry, the promised sizes, closed-form shadows.
+
+use glam::{DVec3, Vec3};
+use umbrage_scene::{BuiltinInfo, Scene, SceneError, builtin, builtins, closed_form};
+
+fn small(info: &BuiltinInfo) -> u32 {
+    info.default_size.div_ceil(8)
+}
+
+#[test]
+fn every_scene_is_sound_at_small_and_default_size() {
+    for info in builtins() {
+        for size in [1, small(info), info.default_size] {
+            let scene = builtin(info.name, Some(size)).unwrap();
+            assert_sound(&scene, &format!("{} size {size}", info.name));
+        }
+    }
+}
+
+fn assert_sound(scene: &Scene, what: &str) {
+    assert!(
+        !scene.cameras.is_empty() && !scene.lights.is_empty(),
+        "{what}: view and sun"
+    );
+    assert!(scene.notices.is_empty(), "{what}");
+    assert!(!scene.instances.is_empty(), "{what}");
+    for i in &scene.instances {
+        assert!(i.mesh < scene.meshes.len(), "{what}");
+        assert!(i.world_from_mesh.is_finite(), "{what}");
+        assert!(
+            i.world_from_mesh.matrix3.determinant().abs() > 1e-12,
+            "{what}"
+        );
+    }
+    for (k, m) in scene.meshes.iter().enumerate() {
+        let what = format!("{what}, mesh {k} of {}", scene.materials[m.material].name);
+        let n = m.positions.len();
+        assert!(m.positions.iter().all(|p| p.is_finite()), "{what}");
+        assert_eq!(m.normals.len(), n, "{what}");
+        assert!(
+            m.normals.iter().all(|p| (p.length() - 1.0).abs() < 1e-4),
+            "{what}: normals"
+        );
+        assert!(m.uvs.is_empty() || m.uvs.len() == n, "{what}");
+        assert!(m.uvs.iter().all(|p| p.is_finite()), "{what}");
+        assert!(!m.triangles.is_empty(), "{what}");
+        let mut inside_out = 0;
+        for t in &m.triangles {
+            assert!(t.iter().all(|&i| (i as usize) < n), "{what}");
+            let [a, b, c] = t.map(|i| m.positions[i as usize]);
+            let face = (b - a).cross(c - a);
+            assert!(face.length() > 0.0, "{what}: degenerate {a} {b} {c}");
+            let shading: Vec3 = t.iter().map(|&i| m.normals[i as usize]).sum();
+            inside_out += usize::from(face.dot(shading) <= 0.0);
+        }
+        assert!(
+            inside_out * 500 <= m.triangles.len(),
+            "{what}: {inside_out} faces inside out"
+        );
+    }
+    let bounds = scene.bounds();
+    assert!(!bounds.is_empty(), "{what}");
+    for c in &scene.cameras {
+        assert!(
+            0.0 < c.near && c.near < c.far && c.far.is_finite(),
+            "{what}"
+        );
+        assert!((c.target - c.eye).length() > 0.0, "{what}");
+    }
+}
+
+#[test]
+fn default_sizes_build_quickly_and_largest_reach_millions() {
+    for info in builtins() {
+        let scene = builtin(info.name, None).unwrap();
+        assert!(
+            scene.stored_triangles() <= 300_000,
+            "{}: {}",
+            info.name,
+            scene.stored_triangles()
+        );
+        assert!(
+            scene.drawn_triangles() <= 1_000_000,
+            "{}: {}",
+            info.name,
+            scene.drawn_triangles()
+        );
+        let [a, b] = [info.max_size / 8, info.max_size / 4]
+            .map(|s| builtin(info.name, Some(s)).unwrap().drawn_triangles() as f64);
+        // The growth from one to the next, twice more.
+        assert!(
+            b * (b / a).powi(2) > 4e6,
+            "{}: {a} and {b} triangles",
+            info.name
+        );
+    }
+}
+
+#[test]
+fn same_again() {
+    for info in builtins() {
+        let [a, b] =
+            [0, 1].map(|_| format!("{:?}", builtin(info.name, Some(small(info))).unwrap()));
+        assert_eq!(a, b, "{}", info.name);
+    }
+}
+
+#[test]
+fn unknown_names_and_sizes_are_refused_helpfully() {
+    let e = builtin("shpere", None).unwrap_err();
+    assert!(
+        matches!(
+            e,
+            SceneError::UnknownBuiltin {
+                nearest: "sphere",
+                ..
+            }
+        ),
+        "{e}"
+    );
+    assert_eq!(
+        e.to_string(),
+        r#"no built-in scene is called "shpere"; did you mean "sphere"?"#
+    );
+    for info in builtins() {
+        for size in [0, info.max_size + 1, u32::MAX] {
+            let e = builtin(info.name, Some(size)).unwrap_err();
+            assert!(matches!(e, SceneError::BuiltinSize { .. }), "{e}");
+        }
+    }
+}
+
+/// Whether anything stands between a ground point and the light, by trying every triangle.
+fn blocked(scene: &Scene, from: DVec3, to_light: DVec3) -> bool {
+    let origin = from + to_light * 1e-6;
+    scene.instances.iter().any(|i| {
+        let mesh = &scene.meshes[i.mesh];
+        mesh.triangles.iter().any(|t| {
+            let [a, b, c] = t.map(|k| {
+                i.world_from_mesh
+                    .transform_point3(mesh.positions[k as usize].as_dvec3())
+            });
+            // Möller and Trumbore 1997.
+            let (e1, e2) = (b - a, c - a);
+            let p = to_light.cross(e2);
+            let det = e1.dot(p);
+            let s = origin - a;
+            let q = s.cross(e1);
+            let (u, v, t) = (s.dot(p) / det, to_light.dot(q) / det, e2.dot(q) / det);
+            det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0
+        })
+    })
+}
+
+#[test]
+fn closed_forms_agree_with_their_geometry() {
+    type Form = fn(DVec3, DVec3) -> bool;
+    let forms: [(&str, u32, Form); 3] = [
+        ("pole", 2, closed_form::pole_shadows),
+        ("slit", 2, closed_form::slit_shadows),
+        ("sphere", 48, closed_form::sphere_shadows),
+    ];
+    for (name, size, shadows) in forms {
+        let scene = builtin(name, Some(size)).unwrap();
+        for direction in [
+            DVec3::new(0.7, -1.0, 0.3),
+            DVec3::new(-0.9, -0.8, 0.0),
+            DVec3::NEG_Y,
+        ] {
+            let mut dark = 0;
+            for k in 0..4000 {
+                // A spiral around the origin: dense at the foot of things, as far as shadows reach.
+                let (r, a) = (
+                    7.0 * (f64::from(k) + 0.5) / 4000.0,
+                    f64::from(k) * 2.399_963,
+                );
+                let p = DVec3::new(r * a.cos(), 0.0, r * a.sin());
+                let step = 4e-3;
+                let around = [DVec3::ZERO, DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z];
+                let mut near_by = around.map(|d| shadows(p + d * step, direction)).into_iter();
+                let expected = near_by.next().unwrap();
+                if near_by.any(|n| n != expected) {
+                    continue; // On the outline either answer is right.
+                }
+                dark += usize::from(expected);
+                assert_eq!(
+                    blocked(&scene, p, -direction),
+                    expected,
+                    "{name}, {direction}: {p}"
+                );
+            }
+            assert!(
+                dark > 20,
+                "{name}, {direction}: only {dark} points in shadow were tried"
+            );
+        }
+    }
+}
