@@ -1,0 +1,206 @@
+//! Files that are there whole or not at all.
+
+use crate::{Error, Image, Rgb};
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+/// Writes `bytes` to a file that nobody ever sees unfinished: into a temporary one in the same
+/// folder, then renamed. An existing file is replaced.
+///
+/// # Errors
+/// If the folder does not exist or cannot be written; nothing stays behind then.
+pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
+    let path = path.as_ref();
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".umbrage-");
+    // Temporary files are private by default; these become ordinary ones.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let write = || {
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(bytes)?;
+        file.persist(path).map_err(|e| e.error)?;
+        Ok(())
+    };
+    write().map_err(|source| Error::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// A kind of pixel that PNG files hold.
+pub trait PngPixel: Copy {
+    #[doc(hidden)]
+    const COLOR: ExtendedColorType;
+    #[doc(hidden)]
+    fn bytes(pixels: &[Self]) -> &[u8];
+}
+
+/// Grey.
+impl PngPixel for u8 {
+    const COLOR: ExtendedColorType = ExtendedColorType::L8;
+    fn bytes(pixels: &[Self]) -> &[u8] {
+        pixels
+    }
+}
+
+/// sRGB.
+impl PngPixel for Rgb {
+    const COLOR: ExtendedColorType = ExtendedColorType::Rgb8;
+    fn bytes(pixels: &[Self]) -> &[u8] {
+        pixels.as_flattened()
+    }
+}
+
+/// Writes a PNG file, whole or not at all.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_png<P: PngPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Result<(), Error> {
+    let path = path.as_ref();
+    let [w, h] = image.size();
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+        .write_image(P::bytes(image.pixels()), w, h, P::COLOR)
+        .map_err(|e| Error::Encode {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        })?;
+    write_file(path, &bytes)
+}
+
+/// A kind of pixel that EXR files hold.
+pub trait ExrPixel: Copy {
+    #[doc(hidden)]
+    const CHANNELS: &'static [&'static str];
+    #[doc(hidden)]
+    fn channel(self, index: usize) -> f32;
+}
+
+/// One channel, `Y`.
+impl ExrPixel for f32 {
+    const CHANNELS: &'static [&'static str] = &["Y"];
+    fn channel(self, _: usize) -> f32 {
+        self
+    }
+}
+
+/// `R`, `G`, `B`, linear.
+impl ExrPixel for [f32; 3] {
+    const CHANNELS: &'static [&'static str] = &["R", "G", "B"];
+    fn channel(self, index: usize) -> f32 {
+        self[index]
+    }
+}
+
+/// Writes an EXR file with the raw 32-bit floats, infinities and NaN included, whole or not at all.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_exr<P: ExrPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Result<(), Error> {
+    let path = path.as_ref();
+    let channels = P::CHANNELS.iter().enumerate().map(|(i, &name)| {
+        let samples = image.pixels().iter().map(|p| p.channel(i)).collect();
+        AnyChannel::new(name, FlatSamples::F32(samples))
+    });
+    let size = image.size().map(|n| n as usize);
+    let exr = ExrImage::from_channels((size[0], size[1]), AnyChannels::sort(channels.collect()));
+    let mut bytes = Cursor::new(Vec::new());
+    exr.write()
+        .to_buffered(&mut bytes)
+        .map_err(|e| Error::Encode {
+            path: path.to_owned(),
+            reason: e.to_string(),
+        })?;
+    write_file(path, bytes.get_ref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn only_file(folder: &Path) -> Vec<String> {
+        let names = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|f| f.unwrap().file_name());
+        names.map(|n| n.into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn png_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_png(
+            &path,
+            &Image::from_fn([3, 2], |x, y| [x as u8, y as u8, 7]).unwrap(),
+        )
+        .unwrap();
+        let read = image::open(&path).unwrap();
+        assert_eq!(read.color(), image::ColorType::Rgb8);
+        assert_eq!(read.to_rgb8().get_pixel(2, 1).0, [2, 1, 7]);
+        write_png(
+            &path,
+            &Image::from_fn([2, 2], |x, _| 255 * x as u8).unwrap(),
+        )
+        .unwrap();
+        let read = image::open(&path).unwrap();
+        assert_eq!(read.color(), image::ColorType::L8);
+        assert_eq!(read.to_luma8().into_raw(), [0, 255, 0, 255]);
+        assert_eq!(only_file(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn exr_keeps_every_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let values = [0.1, -1e30, f32::INFINITY, f32::NAN, 0.0, 1e-40];
+        write_exr(&path, &Image::new([3, 2], values.to_vec()).unwrap()).unwrap();
+        let read = exr::prelude::read_first_flat_layer_from_file(&path).unwrap();
+        let channel = &read.layer_data.channel_data.list[0];
+        assert_eq!(channel.name.to_string(), "Y");
+        let FlatSamples::F32(samples) = &channel.sample_data else {
+            panic!("not f32")
+        };
+        let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(samples), bits(&values));
+        write_exr(
+            &path,
+            &Image::from_fn([2, 1], |x, _| [x as f32, 2.0, 3.0]).unwrap(),
+        )
+        .unwrap();
+        let read = image::open(&path).unwrap().to_rgb32f();
+        assert_eq!(read.get_pixel(1, 0).0, [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn failures_name_the_file_and_leave_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("no/such/folder/a.png");
+        let error = write_file(&missing, b"x").unwrap_err().to_string();
+        assert!(error.contains("a.png"), "{error}");
+        // A folder stands where the file should go.
+        let taken = folder.path().join("taken");
+        std::fs::create_dir(&taken).unwrap();
+        assert!(write_file(&taken, b"x").is_err());
+        assert_eq!(only_file(folder.path()), ["taken"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn files_can_be_read_by_whom_the_folder_allows() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+        write_file(&ours, b"x").unwrap();
+        std::fs::write(&plain, b"x").unwrap();
+        let mode = |path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+}

@@ -1,0 +1,101 @@
+use crate::Error;
+
+/// A colour, 8-bit sRGB.
+pub type Rgb = [u8; 3];
+
+/// One value a pixel, row by row from the upper left corner.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image<T> {
+    size: [u32; 2],
+    pixels: Vec<T>,
+}
+
+impl<T> Image<T> {
+    /// `size` is width and height, 1 to 65536 each; `pixels` has one value for each.
+    pub fn new(size: [u32; 2], pixels: Vec<T>) -> Result<Self, Error> {
+        check_size(size)?;
+        if pixels.len() as u64 != u64::from(size[0]) * u64::from(size[1]) {
+            return Err(Error::Values {
+                size,
+                values: pixels.len(),
+            });
+        }
+        Ok(Self { size, pixels })
+    }
+
+    /// Asks `value` for each pixel (column, row).
+    pub fn from_fn(size: [u32; 2], mut value: impl FnMut(u32, u32) -> T) -> Result<Self, Error> {
+        check_size(size)?;
+        let [w, h] = size;
+        let pixels = (0..h)
+            .flat_map(|y| (0..w).map(move |x| (x, y)))
+            .map(|(x, y)| value(x, y));
+        Ok(Self {
+            size,
+            pixels: pixels.collect(),
+        })
+    }
+
+    /// Width and height, pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Row by row from the upper left corner.
+    pub fn pixels(&self) -> &[T] {
+        &self.pixels
+    }
+
+    /// The value at column `x` and row `y`.
+    ///
+    /// # Panics
+    /// If they lie outside.
+    pub fn at(&self, x: u32, y: u32) -> &T {
+        assert!(
+            x < self.size[0] && y < self.size[1],
+            "pixel ({x}, {y}) outside {:?}",
+            self.size
+        );
+        &self.pixels[self.index(x, y)]
+    }
+
+    /// The image of `f` of each value.
+    pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Image<U> {
+        Image {
+            size: self.size,
+            pixels: self.pixels.iter().map(f).collect(),
+        }
+    }
+
+    pub(crate) fn index(&self, x: u32, y: u32) -> usize {
+        y as usize * self.size[0] as usize + x as usize
+    }
+
+    /// Column and row of the pixel at `index`.
+    pub(crate) fn position(&self, index: usize) -> [u32; 2] {
+        let width = self.size[0] as usize;
+        [(index % width) as u32, (index / width) as u32]
+    }
+
+    /// That this image has the truth's size.
+    pub(crate) fn check_like<U>(&self, truth: &Image<U>, what: &'static str) -> Result<(), Error> {
+        if self.size == truth.size {
+            return Ok(());
+        }
+        Err(Error::Mismatch {
+            what,
+            expected: truth.size,
+            size: self.size,
+        })
+    }
+}
+
+fn check_size(size: [u32; 2]) -> Result<(), Error> {
+    if size.iter().all(|n| (1..=65536).contains(n)) {
+        return Ok(());
+    }
+    Err(Error::Size {
+        what: "image",
+        size,
+    })
+}

@@ -1,0 +1,209 @@
+//! Pictures made of measurements: what is wrong, how coarse, which map, where its texels lie.
+
+use crate::color::{FALSE_LIGHT, FALSE_SHADOW, PARTITIONS, mix};
+use crate::metrics::check_visibilities;
+use crate::{Error, ErrorScale, Image, Rgb};
+
+/// An 8-bit grey for a visibility in 0 (in shadow, black) ..= 1 (lit, white); values beyond are
+/// clamped, NaN is black.
+pub fn grey(visibility: f32) -> u8 {
+    (visibility.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+/// Truth against technique, over the dimmed `picture`: [`FALSE_LIGHT`] where the technique is lighter
+/// than the truth, [`FALSE_SHADOW`] where it is darker, as opaque as the difference is large. Pixels not
+/// counted are dimmed further.
+///
+/// # Errors
+/// Sizes that differ, or a visibility that is not finite at a counted pixel.
+pub fn difference_map(
+    truth: &Image<f32>,
+    technique: &Image<f32>,
+    counted: &Image<bool>,
+    picture: &Image<Rgb>,
+) -> Result<Image<Rgb>, Error> {
+    check_visibilities(truth, technique, counted)?;
+    picture.check_like(truth, "picture")?;
+    Image::from_fn(truth.size(), |x, y| {
+        let below = dimmed(*picture.at(x, y), *counted.at(x, y));
+        if !counted.at(x, y) {
+            return below;
+        }
+        let difference = technique.at(x, y).clamp(0.0, 1.0) - truth.at(x, y).clamp(0.0, 1.0);
+        mix(
+            below,
+            if difference > 0.0 {
+                FALSE_LIGHT
+            } else {
+                FALSE_SHADOW
+            },
+            difference.abs(),
+        )
+    })
+}
+
+/// Errors in pixels per texel by the colours of `scale`; pixels not counted show the dimmed `picture`,
+/// counted ones whose error is NaN (no map serves them) are hatched.
+///
+/// # Errors
+/// Sizes that differ.
+pub fn error_map(
+    error_px: &Image<f32>,
+    counted: &Image<bool>,
+    picture: &Image<Rgb>,
+    scale: ErrorScale,
+) -> Result<Image<Rgb>, Error> {
+    counted.check_like(error_px, "mask of counted pixels")?;
+    picture.check_like(error_px, "picture")?;
+    Image::from_fn(error_px.size(), |x, y| {
+        if !counted.at(x, y) {
+            return dimmed(*picture.at(x, y), false);
+        }
+        let hatch = if (x + y) / 3 % 2 == 0 {
+            [90; 3]
+        } else {
+            [160; 3]
+        };
+        scale.color(*error_px.at(x, y)).unwrap_or(hatch)
+    })
+}
+
+/// Which map of a plan serves each pixel: the dimmed `picture` tinted by the map's index in
+/// [`PARTITIONS`], which repeats. `None`: no map; only dimmed.
+///
+/// # Errors
+/// Sizes that differ.
+pub fn partition_map(
+    map_index: &Image<Option<u16>>,
+    picture: &Image<Rgb>,
+) -> Result<Image<Rgb>, Error> {
+    picture.check_like(map_index, "picture")?;
+    Image::from_fn(map_index.size(), |x, y| {
+        let below = *picture.at(x, y);
+        map_index.at(x, y).map_or(dimmed(below, false), |i| {
+            let tint = PARTITIONS[usize::from(i) % PARTITIONS.len()];
+            // Shading stays visible: the tint at the picture's own lightness.
+            mix([0; 3], tint, 0.25 + 0.75 * luma(below) / 255.0)
+        })
+    })
+}
+
+/// The map's texels as they lie on the surfaces: a line every 5 texels over the `picture` (Lloyd et
+/// al. 2006, Fig. 15). `texel` is (s, t) of each pixel times the map's resolution, NaN where no map
+/// serves it. Lines that would be too dense to see fade into an even tint.
+///
+/// # Errors
+/// Sizes that differ.
+pub fn texel_map(texel: &Image<[f32; 2]>, picture: &Image<Rgb>) -> Result<Image<Rgb>, Error> {
+    const PERIOD: f32 = 5.0;
+    const LINE: Rgb = FALSE_LIGHT;
+    /// Width of a line, pixels.
+    const WIDTH: f32 = 1.5;
+    picture.check_like(texel, "picture")?;
+    Image::from_fn(texel.size(), |x, y| {
+        let here = *texel.at(x, y);
+        if here.iter().any(|c| !c.is_finite()) {
+            return dimmed(*picture.at(x, y), false);
+        }
+        let below = mix([0; 3], *picture.at(x, y), 0.6);
+        let cover = (0..2).map(|axis| {
+            let per_pixel = gradient(texel, x, y, axis) / PERIOD;
+            let phase = here[axis] / PERIOD;
+            let from_line_px = (phase - phase.round()).abs() / per_pixel.max(1e-6);
+            let line = (WIDTH / 2.0 + 0.5 - from_line_px).clamp(0.0, 1.0);
+            // From 4 pixels between lines on, show what they would cover on average.
+            let even = (WIDTH * per_pixel).min(1.0);
+            let fade = ((per_pixel - 0.25) / 0.25).clamp(0.0, 1.0);
+            line + (even - line) * fade
+        });
+        mix(below, LINE, cover.fold(0.0, f32::max))
+    })
+}
+
+/// How fast coordinate `axis` changes from pixel to pixel. Of the neighbours on either side the one
+/// that differs less counts: the other may lie on another surface.
+fn gradient(texel: &Image<[f32; 2]>, x: u32, y: u32, axis: usize) -> f32 {
+    let [w, h] = texel.size();
+    let here = texel.at(x, y)[axis];
+    let step = |x: Option<u32>, y: Option<u32>| match (x, y) {
+        (Some(x), Some(y)) if x < w && y < h => (texel.at(x, y)[axis] - here).abs(),
+        _ => f32::NAN,
+    };
+    // `min` ignores NaN.
+    let dx = step(x.checked_sub(1), Some(y)).min(step(Some(x + 1), Some(y)));
+    let dy = step(Some(x), y.checked_sub(1)).min(step(Some(x), Some(y + 1)));
+    let known = |d: f32| if d.is_nan() { 0.0 } else { d };
+    known(dx).hypot(known(dy))
+}
+
+/// Grey and darker, so that colours over it stand out.
+fn dimmed(color: Rgb, counted: bool) -> Rgb {
+    let strength = if counted { 0.5 } else { 0.25 };
+    [(luma(color) * strength + 14.0) as u8; 3]
+}
+
+/// Rec. 709 luma of sRGB values, 0 ..= 255.
+fn luma([r, g, b]: Rgb) -> f32 {
+    0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image<T: Clone>(size: [u32; 2], pixels: &[T]) -> Image<T> {
+        Image::new(size, pixels.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn difference_tells_light_from_shadow() {
+        let truth = image([4, 1], &[0.0, 1.0, 1.0, 0.0]);
+        let technique = image([4, 1], &[1.0, 0.0, 1.0, f32::NAN]);
+        let counted = image([4, 1], &[true, true, true, false]);
+        let picture = image([4, 1], &[[200; 3]; 4]);
+        let map = difference_map(&truth, &technique, &counted, &picture).unwrap();
+        assert_eq!(map.pixels(), [FALSE_LIGHT, FALSE_SHADOW, [114; 3], [64; 3]]);
+    }
+
+    #[test]
+    fn error_map_keeps_what_is_not_measured_apart() {
+        let error = image([4, 1], &[1.0, 8.0, f32::NAN, 8.0]);
+        let counted = image([4, 1], &[true, true, true, false]);
+        let picture = image([4, 1], &[[200; 3]; 4]);
+        let scale = ErrorScale::default();
+        let map = error_map(&error, &counted, &picture, scale).unwrap();
+        let expected = [
+            scale.color(1.0).unwrap(),
+            scale.color(8.0).unwrap(),
+            [90; 3],
+            [64; 3],
+        ];
+        assert_eq!(map.pixels(), expected);
+        assert!(error_map(&error, &image([1, 1], &[true]), &picture, scale).is_err());
+    }
+
+    #[test]
+    fn partitions_repeat_and_gaps_stay_grey() {
+        let index = image([3, 1], &[Some(0), Some(PARTITIONS.len() as u16), None]);
+        let map = partition_map(&index, &image([3, 1], &[[255; 3]; 3])).unwrap();
+        assert_eq!(map.pixels(), [PARTITIONS[0], PARTITIONS[0], [77; 3]]);
+    }
+
+    #[test]
+    fn texel_lines_come_every_five() {
+        // A texel a tenth of a pixel column wide: a line every 50 columns, and none along t.
+        let texel = Image::from_fn([200, 8], |x, _| [x as f32 * 0.1, 2.5]).unwrap();
+        let picture = texel.map(|_| [0, 0, 0]);
+        let map = texel_map(&texel, &picture).unwrap();
+        let lines: Vec<u32> = (0..200).filter(|&x| *map.at(x, 4) == FALSE_LIGHT).collect();
+        assert_eq!(lines, [0, 50, 100, 150]);
+        // 20 texels a pixel: no lines to see, an even tint.
+        let dense = Image::from_fn([50, 8], |x, _| [x as f32 * 20.3, 2.5]).unwrap();
+        let map = texel_map(&dense, &dense.map(|_| [0, 0, 0])).unwrap();
+        assert!(map.pixels().iter().all(|c| c == map.at(0, 0)));
+        // Nothing served: only dimmed.
+        let none = image([2, 2], &[[f32::NAN; 2]; 4]);
+        let map = texel_map(&none, &none.map(|_| [255; 3])).unwrap();
+        assert_eq!(map.pixels(), [[77; 3]; 4]);
+    }
+}

@@ -1,0 +1,327 @@
+use crate::{Error, Image};
+use serde::{Deserialize, Serialize};
+
+/// How far a technique's visibility is from the truth, over the counted pixels.
+///
+/// Without a counted pixel there is nothing to measure: [`counted`](Self::counted) is 0 and all the
+/// rest is `None` (JSON `null`), not a flattering 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// How many pixels were counted.
+    #[serde(default, rename = "counted_pixels")]
+    pub counted: u64,
+    /// Share whose visibility differs from the truth by more than 1/2; 0 ..= 1.
+    pub wrong_fraction: Option<f64>,
+    /// The part of `wrong_fraction` that is lit and should be dark: leaks, detached shadows.
+    #[serde(default)]
+    pub false_light: Option<f64>,
+    /// The part of `wrong_fraction` that is dark and should be lit: acne, jagged edges.
+    #[serde(default)]
+    pub false_shadow: Option<f64>,
+    /// Mean of |visibility − truth|; 0 ..= 1.
+    pub mean_abs_error: Option<f64>,
+    /// Mean of ꟻLIP (Andersson et al. 2020) between the two visibility images, shown as 8-bit grey at
+    /// [`nv_flip::DEFAULT_PIXELS_PER_DEGREE`] (67, a desktop monitor), over all pixels of the
+    /// picture; those not counted take the truth's value in both. 0 ..= 1.
+    pub flip: Option<f64>,
+}
+
+/// The distribution of the shadow map's error over the counted pixels, pixels per texel.
+///
+/// Percentiles are by nearest rank: the smallest value that at least that share of pixels does not
+/// exceed. All `None` if no counted pixel has a finite error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ErrorPx {
+    /// Median.
+    pub p50: Option<f64>,
+    /// 95th percentile.
+    pub p95: Option<f64>,
+    /// Largest.
+    pub max: Option<f64>,
+    /// Counted pixels left out because their error is not finite: no map serves them, or the surface
+    /// is edge-on to the light.
+    #[serde(default)]
+    pub undefined: u64,
+}
+
+/// Compares `technique` with `truth`, both visibilities in 0 (in shadow) ..= 1 (lit); values beyond
+/// (filters that ring) count as the nearer end. `counted` marks the pixels that show a surface facing
+/// the light; values elsewhere do not matter.
+///
+/// # Errors
+/// Sizes that differ, or a visibility that is not finite at a counted pixel.
+pub fn measure(
+    truth: &Image<f32>,
+    technique: &Image<f32>,
+    counted: &Image<bool>,
+) -> Result<Metrics, Error> {
+    check_visibilities(truth, technique, counted)?;
+    let (mut n, mut false_light, mut false_shadow, mut sum) = (0_u64, 0_u64, 0_u64, 0.0);
+    for difference in differences(truth, technique, counted).flatten() {
+        n += 1;
+        false_light += u64::from(difference > 0.5);
+        false_shadow += u64::from(difference < -0.5);
+        sum += f64::from(difference.abs());
+    }
+    if n == 0 {
+        return Ok(Metrics::default());
+    }
+    let share = |count: u64| Some(count as f64 / n as f64);
+    Ok(Metrics {
+        counted: n,
+        wrong_fraction: share(false_light + false_shadow),
+        false_light: share(false_light),
+        false_shadow: share(false_shadow),
+        mean_abs_error: Some(sum / n as f64),
+        flip: Some(flip(truth, technique, counted)),
+    })
+}
+
+/// The distribution of `error`, pixels per texel, over the `counted` pixels. Values that are not
+/// finite are left out and reported as [`ErrorPx::undefined`].
+///
+/// # Errors
+/// Sizes that differ.
+pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<ErrorPx, Error> {
+    error.check_like(counted, "error")?;
+    let all = error
+        .pixels()
+        .iter()
+        .zip(counted.pixels())
+        .filter(|&(_, &counted)| counted);
+    let (mut finite, undefined): (Vec<f32>, Vec<f32>) =
+        all.map(|(&e, _)| e).partition(|e| e.is_finite());
+    let mut percentile = |p: f64| {
+        let rank = (p * finite.len() as f64).ceil() as usize;
+        let index = rank.checked_sub(1)?;
+        Some(f64::from(
+            *finite.select_nth_unstable_by(index, f32::total_cmp).1,
+        ))
+    };
+    Ok(ErrorPx {
+        p50: percentile(0.50),
+        p95: percentile(0.95),
+        max: percentile(1.0),
+        undefined: undefined.len() as u64,
+    })
+}
+
+/// The centre of the square of 32×32 pixels in which `technique` is most wrong (largest sum of
+/// |visibility − truth|): a place worth a close look. `None` if it is right everywhere.
+///
+/// # Errors
+/// As [`measure`].
+pub fn worst_spot(
+    truth: &Image<f32>,
+    technique: &Image<f32>,
+    counted: &Image<bool>,
+) -> Result<Option<[u32; 2]>, Error> {
+    const SIDE: u32 = 32;
+    check_visibilities(truth, technique, counted)?;
+    let [w, h] = truth.size();
+    let columns = w.div_ceil(SIDE) as usize;
+    let mut sums = vec![0.0_f64; columns * h.div_ceil(SIDE) as usize];
+    for (i, difference) in differences(truth, technique, counted).enumerate() {
+        let [x, y] = truth.position(i);
+        sums[(y / SIDE) as usize * columns + (x / SIDE) as usize] +=
+            f64::from(difference.unwrap_or(0.0).abs());
+    }
+    // The first of equals, so that the answer does not depend on how the maximum is searched.
+    let mut worst = 0;
+    for (i, sum) in sums.iter().enumerate() {
+        if *sum > sums[worst] {
+            worst = i;
+        }
+    }
+    let cell = [(worst % columns) as u32, (worst / columns) as u32];
+    let center = |cell: u32, n: u32| (cell * SIDE + SIDE / 2).min(n - 1);
+    Ok((sums[worst] > 0.0).then(|| [center(cell[0], w), center(cell[1], h)]))
+}
+
+/// `technique` − `truth` at each pixel; `None` where it is not counted.
+fn differences<'a>(
+    truth: &'a Image<f32>,
+    technique: &'a Image<f32>,
+    counted: &'a Image<bool>,
+) -> impl Iterator<Item = Option<f32>> + 'a {
+    let pairs = truth.pixels().iter().zip(technique.pixels());
+    pairs
+        .zip(counted.pixels())
+        .map(|((t, v), &counted)| counted.then(|| v.clamp(0.0, 1.0) - t.clamp(0.0, 1.0)))
+}
+
+pub(crate) fn check_visibilities(
+    truth: &Image<f32>,
+    technique: &Image<f32>,
+    counted: &Image<bool>,
+) -> Result<(), Error> {
+    technique.check_like(truth, "visibility")?;
+    counted.check_like(truth, "mask of counted pixels")?;
+    for (what, image) in [("truth", truth), ("visibility", technique)] {
+        let values = image.pixels().iter().zip(counted.pixels());
+        if let Some(i) = values
+            .clone()
+            .position(|(v, &counted)| counted && !v.is_finite())
+        {
+            return Err(Error::NotFinite {
+                what,
+                pixel: image.position(i),
+                value: image.pixels()[i],
+            });
+        }
+    }
+    Ok(())
+}
+
+fn flip(truth: &Image<f32>, technique: &Image<f32>, counted: &Image<bool>) -> f64 {
+    let [w, h] = truth.size();
+    let picture = |visibility: &Image<f32>| {
+        let values = visibility
+            .pixels()
+            .iter()
+            .zip(truth.pixels())
+            .zip(counted.pixels());
+        let rgb: Vec<u8> = values
+            .flat_map(|((&v, &truth), &counted)| {
+                [crate::maps::grey(if counted { v } else { truth }); 3]
+            })
+            .collect();
+        nv_flip::FlipImageRgb8::with_data(w, h, &rgb)
+    };
+    let map = nv_flip::flip(
+        picture(truth),
+        picture(technique),
+        nv_flip::DEFAULT_PIXELS_PER_DEGREE,
+    );
+    // Summed here in f64: the pool of `nv_flip` sums in f32 and keeps a histogram besides.
+    let values = map.to_vec();
+    values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image<T: Clone>(size: [u32; 2], pixels: &[T]) -> Image<T> {
+        Image::new(size, pixels.to_vec()).unwrap()
+    }
+
+    #[test]
+    fn counts_by_definition() {
+        // Wrong needs *more* than 1/2; the fourth pixel would be wrong but is not counted; values
+        // beyond 0 ..= 1 count as the nearer end.
+        let truth = image([6, 1], &[0.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
+        let technique = image([6, 1], &[1.0, 0.0, 0.5, 1.0, 0.75, 1.5]);
+        let counted = image([6, 1], &[true, true, true, false, true, true]);
+        let m = measure(&truth, &technique, &counted).unwrap();
+        assert_eq!(m.counted, 5);
+        assert_eq!(m.wrong_fraction, Some(2.0 / 5.0));
+        assert_eq!(m.false_light, Some(1.0 / 5.0));
+        assert_eq!(m.false_shadow, Some(1.0 / 5.0));
+        assert_eq!(m.mean_abs_error, Some(2.75 / 5.0));
+    }
+
+    #[test]
+    fn flip_sees_only_counted_pixels() {
+        let size = [40, 30];
+        let truth = Image::from_fn(size, |x, _| if x < 20 { 0.0 } else { 1.0 }).unwrap();
+        let half = Image::from_fn(size, |x, y| f32::from(x >= 20) * f32::from(y < 15)).unwrap();
+        let all = truth.map(|_| true);
+        let upper = Image::from_fn(size, |_, y| y < 15).unwrap();
+        assert_eq!(measure(&truth, &truth, &all).unwrap().flip, Some(0.0));
+        assert_eq!(measure(&truth, &half, &upper).unwrap().flip, Some(0.0));
+        // A quarter of the picture turned from white to black: ꟻLIP is near 1 inside, and its filter
+        // spreads it by a few pixels.
+        let flip = measure(&truth, &half, &all).unwrap().flip.unwrap();
+        assert!((0.2..0.35).contains(&flip), "{flip}");
+    }
+
+    #[test]
+    fn nothing_counted_is_no_praise() {
+        let v = image([2, 2], &[f32::NAN; 4]);
+        let none = v.map(|_| false);
+        assert_eq!(measure(&v, &v, &none).unwrap(), Metrics::default());
+        assert_eq!(measure_error_px(&v, &none).unwrap(), ErrorPx::default());
+        assert_eq!(worst_spot(&v, &v, &none).unwrap(), None);
+    }
+
+    #[test]
+    fn tiny_images_have_metrics() {
+        let (dark, lit, counted) = (
+            image([1, 1], &[0.0]),
+            image([1, 1], &[1.0]),
+            image([1, 1], &[true]),
+        );
+        let m = measure(&dark, &lit, &counted).unwrap();
+        assert_eq!(m.wrong_fraction, Some(1.0));
+        assert!(m.flip.unwrap() > 0.5, "{m:?}");
+    }
+
+    #[test]
+    fn names_what_is_wrong() {
+        let (a, b) = (image([2, 1], &[0.0; 2]), image([1, 2], &[0.0; 2]));
+        let counted = a.map(|_| true);
+        let text = |e: Result<Metrics, Error>| e.unwrap_err().to_string();
+        assert_eq!(
+            text(measure(&a, &b, &counted)),
+            "visibility must be 2x1 pixels like the truth, is 1x2"
+        );
+        let nan = image([2, 1], &[0.0, f32::NAN]);
+        assert_eq!(
+            text(measure(&a, &nan, &counted)),
+            "visibility: pixel (1, 0) is NaN, must be finite"
+        );
+        assert_eq!(
+            text(measure(&nan, &a, &counted)),
+            "truth: pixel (1, 0) is NaN, must be finite"
+        );
+        assert!(matches!(
+            Image::<f32>::new([0, 4], vec![]),
+            Err(Error::Size { .. })
+        ));
+        assert!(matches!(
+            Image::new([2, 2], vec![1.0]),
+            Err(Error::Values { values: 1, .. })
+        ));
+    }
+
+    #[test]
+    fn percentiles_are_by_nearest_rank() {
+        // 1 … 100 in an order of no help, one uncounted outlier, and two without a finite error.
+        let mut values: Vec<f32> = (0..100).map(|i| (i * 37 % 100 + 1) as f32).collect();
+        values.extend([1e9, f32::INFINITY, f32::NAN]);
+        let error = image([103, 1], &values);
+        let counted = Image::from_fn([103, 1], |x, _| x != 100).unwrap();
+        let expected = ErrorPx {
+            p50: Some(50.0),
+            p95: Some(95.0),
+            max: Some(100.0),
+            undefined: 2,
+        };
+        assert_eq!(measure_error_px(&error, &counted).unwrap(), expected);
+        let one = image([1, 1], &[3.0]);
+        let only = ErrorPx {
+            p50: Some(3.0),
+            p95: Some(3.0),
+            max: Some(3.0),
+            undefined: 0,
+        };
+        assert_eq!(measure_error_px(&one, &one.map(|_| true)).unwrap(), only);
+    }
+
+    #[test]
+    fn finds_the_worst_spot() {
+        let truth = Image::from_fn([100, 70], |_, _| 1.0).unwrap();
+        let technique = Image::from_fn([100, 70], |x, y| {
+            f32::from(!(x > 96 && y > 64 || x < 2 && y < 2))
+        })
+        .unwrap();
+        let all = truth.map(|_| true);
+        // The lower right cell is cut off by the picture's edge; its centre stays inside.
+        assert_eq!(
+            worst_spot(&truth, &technique, &all).unwrap(),
+            Some([99, 69])
+        );
+        assert_eq!(worst_spot(&truth, &truth, &all).unwrap(), None);
+    }
+}

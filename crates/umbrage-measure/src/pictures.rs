@@ -1,0 +1,148 @@
+//! The pictures of a comparison, as files beside its report.
+
+use crate::{
+    Error, ErrorScale, Image, Rgb, difference_map, error_map, grey, worst_spot, write_png,
+};
+use std::path::Path;
+
+/// What was seen with one technique, all of the same size.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The shaded picture.
+    pub color: &'a Image<Rgb>,
+    /// 0 (in shadow) ..= 1 (lit).
+    pub visibility: &'a Image<f32>,
+    /// Pixels per texel on the surface; NaN where no map serves it.
+    pub error_px: &'a Image<f32>,
+    /// From [`partition_map`](crate::partition_map), if wanted.
+    pub partition: Option<&'a Image<Rgb>>,
+    /// From [`texel_map`](crate::texel_map), if wanted.
+    pub texels: Option<&'a Image<Rgb>>,
+}
+
+/// What was seen by rays.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenTruth<'a> {
+    /// The shaded picture.
+    pub color: &'a Image<Rgb>,
+    /// 0 (in shadow) ..= 1 (lit).
+    pub visibility: &'a Image<f32>,
+    /// Pixels that show a surface facing the light.
+    pub counted: &'a Image<bool>,
+}
+
+/// The names of one technique's (or the truth's) PNG files, relative to the report's folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Pictures {
+    /// The shaded picture.
+    pub color: String,
+    /// 8-bit grey: 255 lit, 0 in shadow.
+    pub visibility: String,
+    /// [`difference_map`]; not for the truth.
+    pub difference: Option<String>,
+    /// [`error_map`]; not for the truth.
+    pub error: Option<String>,
+    /// [`partition_map`](crate::partition_map).
+    pub partition: Option<String>,
+    /// [`texel_map`](crate::texel_map).
+    pub texels: Option<String>,
+    /// [`worst_spot`], column and row.
+    pub worst_spot: Option<[u32; 2]>,
+}
+
+/// Writes the truth's pictures into `folder`: `truth-color.png`, `truth-visibility.png`.
+///
+/// # Errors
+/// Sizes that differ, or files that cannot be written.
+pub fn write_truth_pictures(
+    folder: impl AsRef<Path>,
+    truth: &SeenTruth<'_>,
+) -> Result<Pictures, Error> {
+    truth.color.check_like(truth.visibility, "picture")?;
+    let folder = folder.as_ref();
+    let pictures = Pictures {
+        color: "truth-color.png".to_owned(),
+        visibility: "truth-visibility.png".to_owned(),
+        ..Pictures::default()
+    };
+    write_png(folder.join(&pictures.color), truth.color)?;
+    write_png(
+        folder.join(&pictures.visibility),
+        &truth.visibility.map(|&v| grey(v)),
+    )?;
+    Ok(pictures)
+}
+
+/// Makes a technique's maps and writes all its pictures into `folder`, as
+/// `<index>-<shadows>-<kind>.png` with an index from 1.
+///
+/// # Errors
+/// Sizes that differ, a visibility that is not finite at a counted pixel, or files that cannot be
+/// written.
+pub fn write_pictures(
+    folder: impl AsRef<Path>,
+    index: usize,
+    shadows: &str,
+    seen: &Seen<'_>,
+    truth: &SeenTruth<'_>,
+    scale: ErrorScale,
+) -> Result<Pictures, Error> {
+    let &Seen {
+        color,
+        visibility,
+        error_px,
+        ..
+    } = seen;
+    let counted = truth.counted;
+    let spot = worst_spot(truth.visibility, visibility, counted)?;
+    let difference = difference_map(truth.visibility, visibility, counted, truth.color)?;
+    let error = error_map(error_px, counted, truth.color, scale)?;
+    color.check_like(truth.visibility, "picture")?;
+
+    let name = |kind: &str| format!("{index:02}-{}-{kind}.png", file_stem(shadows));
+    let write = |kind, image: &Image<Rgb>| {
+        let name = name(kind);
+        write_png(folder.as_ref().join(&name), image).map(|()| name)
+    };
+    let grey_name = name("visibility");
+    write_png(
+        folder.as_ref().join(&grey_name),
+        &visibility.map(|&v| grey(v)),
+    )?;
+    Ok(Pictures {
+        color: write("color", color)?,
+        visibility: grey_name,
+        difference: Some(write("difference", &difference)?),
+        error: Some(write("error", &error)?),
+        partition: seen.partition.map(|p| write("partition", p)).transpose()?,
+        texels: seen.texels.map(|t| write("texels", t)).transpose()?,
+        worst_spot: spot,
+    })
+}
+
+/// A shadow specification as part of a file name that every system and every URL takes.
+fn file_stem(shadows: &str) -> String {
+    let safe = |c: char| c.is_ascii_alphanumeric() || c == '.' || c == '_';
+    let dashed: String = shadows
+        .chars()
+        .map(|c| if safe(c) { c } else { '-' })
+        .collect();
+    let parts: Vec<&str> = dashed.split('-').filter(|p| !p.is_empty()).collect();
+    parts.join("-").chars().take(80).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_names_are_safe() {
+        assert_eq!(file_stem("lispsm+z4:pcf5@2048"), "lispsm-z4-pcf5-2048");
+        assert_eq!(
+            file_stem("lambda=0.5:csm8(blur=7)"),
+            "lambda-0.5-csm8-blur-7"
+        );
+        assert_eq!(file_stem("../\"<x>é"), "..-x");
+        assert_eq!(file_stem(&"x".repeat(300)).len(), 80);
+    }
+}
