@@ -58,7 +58,10 @@ impl Camera {
         check_position(l.eye, "camera.eye")?;
         check_position(l.target, "camera.target")?;
         let forward = unit(l.target - l.eye, "camera.target").map_err(|_| {
-            Error::invalid("camera.target", format!("must differ from camera.eye, both are {}", l.eye))
+            Error::invalid(
+                "camera.target",
+                format!("must differ from camera.eye, both are {}", l.eye),
+            )
         })?;
         let up = unit(l.up, "camera.up")?;
         check(
@@ -108,8 +111,12 @@ impl Camera {
         const POSE: &str = "camera.world_from_view";
         const PROJECTION: &str = "camera.clip_from_view";
         check_image(image)?;
-        check(world_from_view.is_finite(), POSE, || "has entries that are not finite".into())?;
-        check(clip_from_view.is_finite(), PROJECTION, || "has entries that are not finite".into())?;
+        check(world_from_view.is_finite(), POSE, || {
+            "has entries that are not finite".into()
+        })?;
+        check(clip_from_view.is_finite(), PROJECTION, || {
+            "has entries that are not finite".into()
+        })?;
         let axes = [0, 1, 2].map(|i| world_from_view.col(i).truncate());
         let is_rigid = axes.iter().all(|a| (a.length() - 1.0).abs() < 1e-3)
             && axes[0].dot(axes[1]).abs() < 1e-3
@@ -151,7 +158,10 @@ impl Camera {
             (true, false) => (a, f64::INFINITY),
             (false, true) => (b, f64::INFINITY),
             (false, false) => {
-                return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
+                return Err(Error::invalid(
+                    PROJECTION,
+                    "has no near plane in front of the viewer",
+                ));
             }
         };
         let far = match shadow_distance {
@@ -197,17 +207,32 @@ impl Camera {
     }
 
     fn checked(self) -> Result<Self, Error> {
-        check(self.near > 0.0 && self.near.is_finite(), "camera.near", || {
-            format!("must be positive and finite, is {}", self.near)
-        })?;
-        check(self.far > self.near && self.far <= 1e12, "camera.far", || {
-            format!("must exceed camera.near ({}) and be at most 1e12, is {}", self.near, self.far)
-        })?;
+        check(
+            self.near > 0.0 && self.near.is_finite(),
+            "camera.near",
+            || format!("must be positive and finite, is {}", self.near),
+        )?;
+        check(
+            self.far > self.near && self.far <= 1e12,
+            "camera.far",
+            || {
+                format!(
+                    "must exceed camera.near ({}) and be at most 1e12, is {}",
+                    self.near, self.far
+                )
+            },
+        )?;
         let span = self.slope_max - self.slope_min;
         check(
-            span.min_element() > 1e-9 && self.slope_min.abs().max(self.slope_max.abs()).max_element() < 1e6,
+            span.min_element() > 1e-9
+                && self.slope_min.abs().max(self.slope_max.abs()).max_element() < 1e6,
             "camera.fov_y_rad",
-            || format!("gives a view of slopes {} to {}, too narrow or too wide", self.slope_min, self.slope_max),
+            || {
+                format!(
+                    "gives a view of slopes {} to {}, too narrow or too wide",
+                    self.slope_min, self.slope_max
+                )
+            },
         )?;
         Ok(self)
     }
@@ -295,6 +320,22 @@ impl Camera {
         })
     }
 
+    /// Gradients of [`pixel`](Self::pixel)'s two coordinates, pixels per metre; `None` for points not
+    /// in front of the eye.
+    pub(crate) fn pixel_gradients(&self, world_position: DVec3) -> Option<[DVec3; 2]> {
+        let v = world_position - self.eye;
+        let z = self.forward.dot(v);
+        let span = self.slope_max - self.slope_min;
+        let [width, height] = self.image.map(f64::from);
+        let gradient = |axis: DVec3| (axis - self.forward * (axis.dot(v) / z)) / z;
+        (z > 0.0).then(|| {
+            [
+                gradient(self.right) * (width / span.x),
+                gradient(self.up) * (-height / span.y),
+            ]
+        })
+    }
+
     /// The frustum's corners at `depth`, relative to the eye: lower left, lower right, upper
     /// right, upper left.
     pub(crate) fn corners_at(&self, depth: f64) -> [DVec3; 4] {
@@ -305,7 +346,14 @@ impl Camera {
 }
 
 fn check_image(image: [u32; 2]) -> Result<(), Error> {
-    check(image.iter().all(|&n| (1..=65536).contains(&n)), "camera.image", || {
-        format!("must be 1 to 65536 pixels each way, is {}x{}", image[0], image[1])
-    })
+    check(
+        image.iter().all(|&n| (1..=65536).contains(&n)),
+        "camera.image",
+        || {
+            format!(
+                "must be 1 to 65536 pixels each way, is {}x{}",
+                image[0], image[1]
+            )
+        },
+    )
 }

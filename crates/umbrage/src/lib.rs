@@ -27,14 +27,23 @@
 //!   θ for the angle between view and light direction, λ for the distance from the warp's centre of
 //!   projection to its near plane, μ for the warp's depth range.
 
+pub mod aliasing;
 mod bounds;
 mod camera;
 mod error;
+mod focus;
 mod light;
+mod options;
 mod plan;
+mod planner;
+mod resolution;
+mod warp;
+mod worst;
 
 pub use bounds::{Aabb, Bounds, Plane};
 pub use camera::{Camera, ClipDepth, LookAt};
 pub use error::Error;
 pub use light::{Light, SpotLight};
+pub use options::{Objective, Options, Size, Warp};
 pub use plan::{Beam, MapError, Plan, Receiver, Rows, ShadowMap};
+pub use planner::Planner;

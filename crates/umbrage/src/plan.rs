@@ -56,9 +56,7 @@ impl Rows {
     pub fn t_from_row(self, row: f64) -> f64 {
         match self {
             Self::Even => row,
-            Self::Logarithmic { ratio } => {
-                -(-row * ratio.ln()).exp_m1() * ratio / (ratio - 1.0)
-            }
+            Self::Logarithmic { ratio } => -(-row * ratio.ln()).exp_m1() * ratio / (ratio - 1.0),
         }
     }
 
@@ -178,7 +176,11 @@ impl ShadowMap {
             None => ((far - near).try_normalize()?, f64::INFINITY),
             Some(apex) => ((near - apex).try_normalize()?, near.distance(apex)),
         };
-        Some(Beam { origin: near + self.origin, direction, reach_back })
+        Some(Beam {
+            origin: near + self.origin,
+            direction,
+            reach_back,
+        })
     }
 
     /// A surface point with its plane, as the map sees it. `world_normal` need not have unit length
@@ -193,14 +195,18 @@ impl ShadowMap {
         Some(Receiver {
             st: p.truncate(),
             depth: p.z,
-            slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
+            slope: if slope.is_finite() {
+                slope
+            } else {
+                DVec2::INFINITY
+            },
         })
     }
 
     /// Whether anything in `aabb` (world space) can cast a shadow into this map. Never `false` for
     /// one that does; `true` for some that do not.
     pub fn may_cast(&self, aabb: Aabb) -> bool {
-        let local = Aabb { min: aabb.min - self.origin, max: aabb.max - self.origin };
+        let local = aabb.relative_to(self.origin);
         !self.is_empty() && self.caster_planes.iter().all(|p| p.may_touch(local))
     }
 

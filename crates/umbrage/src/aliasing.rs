@@ -1,0 +1,182 @@
+//! The exact aliasing error of a map at any point, from the Jacobian of the map's own matrix.
+//!
+//! A texel is a beam of light. Where it meets the plane through a point perpendicular to the light it
+//! covers a parallelogram, its [`Footprint`]. Compared with the width of the image beam through a
+//! pixel there, w_i = 2 z tan φ/res_i, this is the *perspective* error: pixels per texel without
+//! regard to what surface is hit (Lloyd et al. 2006, Eq. 1, first factor). On a surface,
+//! [`ShadowMap::surface_error`] also has the second factor, *projection* error, exactly.
+
+use crate::camera::Camera;
+use crate::plan::ShadowMap;
+use glam::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
+
+/// What one texel covers on the plane perpendicular to the light through a point: the parallelogram
+/// spanned by two vectors, world space, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Step from one texel to the next in s.
+    pub per_s: DVec3,
+    /// Step from one texel to the next in t.
+    pub per_t: DVec3,
+}
+
+impl Footprint {
+    /// Length of the parallelogram's base: the texel's width across the warp, metres.
+    pub fn base(&self) -> f64 {
+        self.per_s.length()
+    }
+
+    /// Height of the parallelogram over its base: the texel's width along the warp, metres.
+    pub fn height(&self) -> f64 {
+        self.per_s.cross(self.per_t).length() / self.per_s.length()
+    }
+
+    /// Largest singular value: how far the texel reaches per unit step in the worst direction, metres.
+    pub fn longest(&self) -> f64 {
+        let (s, t) = (self.per_s.length_squared(), self.per_t.length_squared());
+        let mixed = self.per_s.dot(self.per_t);
+        (s.midpoint(t) + ((s - t) / 2.0).hypot(mixed)).sqrt()
+    }
+}
+
+/// Perspective error at a point, pixels per texel: above 1 shadows show jags, below 1 texels are
+/// wasted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointError {
+    /// m_s: base of the texel's footprint over a pixel's width.
+    pub s: f64,
+    /// m_t: height of the footprint over a pixel's width.
+    pub t: f64,
+    /// Error in the worst direction.
+    pub worst: f64,
+}
+
+/// Error on a surface, pixels per texel, perspective and projection together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceError {
+    /// In the worst direction: the larger singular value of the map from texels to pixels.
+    /// Infinite where the surface is edge-on to the light.
+    pub worst: f64,
+    /// In the best direction: the smaller singular value.
+    pub best: f64,
+}
+
+/// The pieces of a map's projection at a point.
+pub(crate) struct Local {
+    /// Fourth coordinate of the projection.
+    pub w: f64,
+    /// Unit vector along the beam, away from the light.
+    pub beam: DVec3,
+    /// Gradients of texel coordinates, 1/m.
+    pub grad_s: DVec3,
+    pub grad_t: DVec3,
+}
+
+impl Local {
+    /// `p` in local space. `None` where the map does not apply.
+    pub(crate) fn at(map: &ShadowMap, p: DVec3) -> Option<Self> {
+        let m = map.shadow_from_local;
+        let [s, t, w] = [0, 1, 3].map(|i| m.row(i));
+        let h = p.extend(1.0);
+        let h_w = w.dot(h);
+        if h_w <= 0.0 {
+            return None;
+        }
+        let t_value = t.dot(h) / h_w;
+        let gradient = |row: DVec4, value: f64| (row.xyz() - w.xyz() * value) / h_w;
+        Some(Self {
+            w: h_w,
+            beam: map.beam_direction(p)?,
+            grad_s: gradient(s, s.dot(h) / h_w) * f64::from(map.resolution[0]),
+            grad_t: gradient(t, t_value)
+                * (f64::from(map.resolution[1]) * map.rows.row_derivative(t_value)),
+        })
+    }
+
+    pub(crate) fn footprint(&self) -> Footprint {
+        let det = self.beam.dot(self.grad_s.cross(self.grad_t));
+        Footprint {
+            per_s: self.grad_t.cross(self.beam) / det,
+            per_t: self.beam.cross(self.grad_s) / det,
+        }
+    }
+}
+
+impl ShadowMap {
+    /// Unit vector along the beam through a local point, away from the light; `None` at a spot
+    /// light's own position.
+    pub(crate) fn beam_direction(&self, local: DVec3) -> Option<DVec3> {
+        match self.apex {
+            Some(apex) => (local - apex).try_normalize(),
+            // All beams meet where depth is infinite, which is the image of the z axis.
+            None => self.local_from_shadow.z_axis.truncate().try_normalize(),
+        }
+    }
+
+    /// What one texel covers around a world point; `None` where the map does not apply.
+    pub fn footprint(&self, world_position: DVec3) -> Option<Footprint> {
+        (!self.is_empty())
+            .then(|| Local::at(self, world_position - self.origin))?
+            .map(|l| l.footprint())
+    }
+
+    /// Perspective error at a world point seen by `camera`; `None` where the map does not apply or
+    /// the point lies behind the eye.
+    pub fn perspective_error(&self, camera: &Camera, world_position: DVec3) -> Option<PointError> {
+        let depth = camera.depth(world_position);
+        let footprint = self.footprint(world_position).filter(|_| depth > 0.0)?;
+        let pixel = depth * camera.pixel_width_per_depth();
+        Some(PointError {
+            s: footprint.base() / pixel,
+            t: footprint.height() / pixel,
+            worst: footprint.longest() / pixel,
+        })
+    }
+
+    /// Error on a surface with the given normal (any length, either side) at a world point seen by
+    /// `camera`; `None` where the map does not apply or the point lies behind the eye.
+    pub fn surface_error(
+        &self,
+        camera: &Camera,
+        world_position: DVec3,
+        world_normal: DVec3,
+    ) -> Option<SurfaceError> {
+        let local = (!self.is_empty()).then(|| Local::at(self, world_position - self.origin))??;
+        let normal = world_normal.try_normalize()?;
+        let (e1, e2) = normal.any_orthonormal_pair();
+        let [pixel_x, pixel_y] = camera.pixel_gradients(world_position)?;
+        let on_surface = |a: DVec3, b: DVec3| {
+            DMat2::from_cols(
+                DVec2::new(a.dot(e1), b.dot(e1)),
+                DVec2::new(a.dot(e2), b.dot(e2)),
+            )
+        };
+        let texels = on_surface(local.grad_s, local.grad_t);
+        let pixels = on_surface(pixel_x, pixel_y);
+        let det = texels.determinant();
+        if det == 0.0 {
+            return Some(SurfaceError {
+                worst: f64::INFINITY,
+                best: 0.0,
+            });
+        }
+        // adj(texels)/det instead of an inverse keeps edge-on surfaces at infinity, not NaN.
+        let adjugate = DMat2::from_cols(
+            DVec2::new(texels.y_axis.y, -texels.x_axis.y),
+            DVec2::new(-texels.y_axis.x, texels.x_axis.x),
+        );
+        let m = pixels * adjugate;
+        let (a, b) = (m.x_axis.length_squared(), m.y_axis.length_squared());
+        let mixed = m.x_axis.dot(m.y_axis);
+        let larger = (a.midpoint(b) + ((a - b) / 2.0).hypot(mixed)).sqrt();
+        let smaller = if larger > 0.0 {
+            m.determinant().abs() / larger
+        } else {
+            0.0
+        };
+        Some(SurfaceError {
+            worst: larger / det.abs(),
+            best: smaller / det.abs(),
+        })
+    }
+}

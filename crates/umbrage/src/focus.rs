@@ -1,0 +1,251 @@
+//! The convex body B of what the camera sees (Wimmer et al. 2004, §3.3), in local space.
+
+use crate::bounds::{Aabb, Plane};
+use crate::camera::Camera;
+use glam::DVec3;
+
+/// A convex polyhedron as vertices and faces, cut down by planes. Its buffers are kept from frame
+/// to frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ConvexBody {
+    vertices: Vec<DVec3>,
+    faces: Vec<Face>,
+    /// Vertex indices of all faces, one loop after the other, counter-clockwise from outside.
+    loops: Vec<u32>,
+    scratch: Scratch,
+}
+
+/// `loops[start..start + len]`, with the plane whose inside is the body's.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    plane: Plane,
+    start: usize,
+    len: usize,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    distances: Vec<f64>,
+    /// Where kept vertices went; `u32::MAX` for those cut off.
+    moved: Vec<u32>,
+    /// Edges cut by the plane (lower, higher old index) and the new vertex on each.
+    cuts: Vec<(u32, u32, u32)>,
+    /// Edges of the new face, in its own sense of rotation.
+    rim: Vec<(u32, u32)>,
+    on_plane: Vec<bool>,
+    vertices: Vec<DVec3>,
+    faces: Vec<Face>,
+    loops: Vec<u32>,
+}
+
+impl ConvexBody {
+    /// Starts over with the camera's frustum, relative to the eye.
+    pub(crate) fn set_frustum(&mut self, camera: &Camera) {
+        self.clear();
+        self.vertices.extend(camera.corners_at(camera.near()));
+        self.vertices.extend(camera.corners_at(camera.far()));
+        // Near corners are 0–3, far ones 4–7: lower left, lower right, upper right, upper left.
+        let faces = [
+            [0, 1, 2, 3],
+            [5, 4, 7, 6],
+            [1, 0, 4, 5],
+            [2, 1, 5, 6],
+            [3, 2, 6, 7],
+            [0, 3, 7, 4],
+        ];
+        for (i, face) in faces.into_iter().enumerate() {
+            let [a, b, c] = [face[0], face[1], face[2]].map(|i: u32| self.vertices[i as usize]);
+            let normal = (c - b).cross(b - a).normalize();
+            // The side planes pass through the eye itself.
+            let through = if i < 2 { a } else { DVec3::ZERO };
+            self.push_face(Plane::through(through, normal), &face);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.vertices.clear();
+        self.faces.clear();
+        self.loops.clear();
+    }
+
+    fn push_face(&mut self, plane: Plane, indices: &[u32]) {
+        self.faces.push(Face {
+            plane,
+            start: self.loops.len(),
+            len: indices.len(),
+        });
+        self.loops.extend_from_slice(indices);
+    }
+
+    pub(crate) fn vertices(&self) -> &[DVec3] {
+        &self.vertices
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
+    /// Planes of all faces, insides inwards.
+    pub(crate) fn planes(&self) -> impl Iterator<Item = Plane> {
+        self.faces.iter().map(|f| f.plane)
+    }
+
+    /// Every edge once, as indices of vertices.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = [usize; 2]> {
+        // Neighbouring faces run along their common edge in opposite directions.
+        self.faces.iter().flat_map(|f| {
+            let corners = self.corners(f);
+            (0..f.len)
+                .map(move |i| [corners[i], corners[(i + 1) % corners.len()]])
+                .filter(|[a, b]| a < b)
+                .map(|e| e.map(|i| i as usize))
+        })
+    }
+
+    /// The surface as triangles, as indices of vertices.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [usize; 3]> {
+        self.faces.iter().flat_map(|f| {
+            let corners = self.corners(f);
+            (1..f.len - 1)
+                .map(move |i| [corners[0], corners[i], corners[i + 1]])
+                .map(|t| t.map(|i| i as usize))
+        })
+    }
+
+    fn corners(&self, face: &Face) -> &[u32] {
+        &self.loops[face.start..face.start + face.len]
+    }
+
+    /// Cuts off what lies outside `aabb` (local space).
+    pub(crate) fn clip_aabb(&mut self, aabb: Aabb) {
+        if aabb.is_empty() {
+            self.clear();
+            return;
+        }
+        // A flat box, a ground plane say, gets a thickness far below what single precision
+        // resolves, so that the body keeps an inside.
+        let pad = 1e-7
+            * self
+                .vertices
+                .iter()
+                .fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            self.clip(Plane {
+                normal: axis,
+                offset: pad - axis.dot(aabb.min),
+            });
+            self.clip(Plane {
+                normal: -axis,
+                offset: pad + axis.dot(aabb.max),
+            });
+        }
+    }
+
+    /// Cuts off what lies outside `plane`.
+    pub(crate) fn clip(&mut self, plane: Plane) {
+        let scale = self
+            .vertices
+            .iter()
+            .fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        // Vertices this close to the plane count as on it: no slivers below rounding.
+        let tolerance = 1e-13 * scale.max(plane.offset.abs());
+        let Scratch {
+            distances,
+            moved,
+            cuts,
+            rim,
+            on_plane,
+            vertices,
+            faces,
+            loops,
+        } = &mut self.scratch;
+        distances.clear();
+        distances.extend(self.vertices.iter().map(|&v| {
+            let d = plane.distance(v);
+            if d.abs() <= tolerance { 0.0 } else { d }
+        }));
+        if distances.iter().all(|&d| d >= 0.0) {
+            return;
+        }
+        if distances.iter().all(|&d| d <= 0.0) {
+            self.clear();
+            return;
+        }
+        vertices.clear();
+        faces.clear();
+        loops.clear();
+        moved.clear();
+        cuts.clear();
+        rim.clear();
+        on_plane.clear();
+        for (&v, &d) in self.vertices.iter().zip(distances.iter()) {
+            if d < 0.0 {
+                moved.push(u32::MAX);
+                continue;
+            }
+            let index = vertices.len() as u32;
+            moved.push(index);
+            vertices.push(v);
+            on_plane.push(d == 0.0);
+        }
+        for face in &self.faces {
+            let corners = &self.loops[face.start..face.start + face.len];
+            let start = loops.len();
+            for (i, &a) in corners.iter().enumerate() {
+                let b = corners[(i + 1) % corners.len()];
+                if moved[a as usize] != u32::MAX {
+                    loops.push(moved[a as usize]);
+                }
+                let (lo, hi) = (a.min(b), a.max(b));
+                let (d_lo, d_hi) = (distances[lo as usize], distances[hi as usize]);
+                if d_lo * d_hi < 0.0 {
+                    let known = cuts.iter().find(|c| (c.0, c.1) == (lo, hi)).map(|c| c.2);
+                    loops.push(known.unwrap_or_else(|| {
+                        let index = vertices.len() as u32;
+                        let [p, q] = [lo, hi].map(|i| self.vertices[i as usize]);
+                        vertices.push(p.lerp(q, d_lo / (d_lo - d_hi)));
+                        cuts.push((lo, hi, index));
+                        on_plane.push(true);
+                        index
+                    }));
+                }
+            }
+            let len = loops.len() - start;
+            if len < 3 {
+                loops.truncate(start);
+                continue;
+            }
+            faces.push(Face {
+                plane: face.plane,
+                start,
+                len,
+            });
+            for i in start..start + len {
+                let (a, b) = (loops[i], loops[start + (i + 1 - start) % len]);
+                if on_plane[a as usize] && on_plane[b as usize] {
+                    rim.push((b, a));
+                }
+            }
+        }
+        if let Some(&(first, mut at)) = rim.first() {
+            let start = loops.len();
+            loops.push(first);
+            while at != first && loops.len() - start < rim.len() {
+                loops.push(at);
+                match rim.iter().find(|edge| edge.0 == at) {
+                    Some(edge) => at = edge.1,
+                    None => break,
+                }
+            }
+            let len = loops.len() - start;
+            if at == first && len >= 3 {
+                faces.push(Face { plane, start, len });
+            } else {
+                loops.truncate(start);
+            }
+        }
+        std::mem::swap(&mut self.vertices, vertices);
+        std::mem::swap(&mut self.faces, faces);
+        std::mem::swap(&mut self.loops, loops);
+    }
+}

@@ -1,0 +1,64 @@
+use super::{OnePoint, Seen};
+use crate::options::Objective;
+
+/// The strength ν = μ/λ of least error over the points seen.
+///
+/// With w_j = 1 + ν ζ_j at vertex j, ζ ∈ [0, 1] its place between near and far plane and d_j its view
+/// distance, the largest errors over the body are those at its vertices: m_s is a ratio of linear
+/// functions, m_t a square of one over another, which is convex. In ω = ln(1 + ν) the logarithm of
+/// m_t is convex too (each ln w_j is a log-sum-exp), and m_s adds little that is not: the sum has
+/// one valley, which a coarse scan brackets and a golden section narrows down.
+pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective) -> f64 {
+    let cost = |omega: f64| cost(family, seen, objective, omega.exp_m1());
+    // Beyond the view's own perspective every error grows.
+    let end = (family.farthest / family.nearest).ln() + 1.0;
+    const STEPS: usize = 12;
+    let at = |i: usize| end * (i as f64) / STEPS as f64;
+    let best = (0..=STEPS)
+        .map(|i| (cost(at(i)), i))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = best.map_or(0, |(_, i)| i);
+    let (mut lo, mut hi) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
+    // Golden section; 36 steps shrink the bracket by 3e-8.
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let (mut a, mut b) = (hi - RATIO * (hi - lo), lo + RATIO * (hi - lo));
+    let (mut cost_a, mut cost_b) = (cost(a), cost(b));
+    for _ in 0..36 {
+        if cost_a <= cost_b {
+            (hi, b, cost_b) = (b, a, cost_a);
+            a = hi - RATIO * (hi - lo);
+            cost_a = cost(a);
+        } else {
+            (lo, a, cost_a) = (a, b, cost_b);
+            b = lo + RATIO * (hi - lo);
+            cost_b = cost(b);
+        }
+    }
+    let omega = lo.midpoint(hi);
+    // The bracket's lower end may be the minimum itself: no warp at all.
+    if cost(0.0) <= cost(omega) {
+        0.0
+    } else {
+        omega.exp_m1()
+    }
+}
+
+/// Logarithm of the quantity to make small.
+fn cost(family: &OnePoint, seen: &[Seen], objective: Objective, nu: f64) -> f64 {
+    let (lo, hi) = family.extent(nu, seen);
+    let (mut s, mut t, mut area) = (0f64, 0f64, 0f64);
+    for p in seen {
+        let w = family.w(nu, p.xz.y);
+        let (at_s, at_t) = (p.base * w, p.height * w * w);
+        s = s.max(at_s);
+        t = t.max(at_t);
+        area = area.max(at_s * at_t);
+    }
+    let common = ((hi - lo) / (1.0 + nu)).ln();
+    match objective {
+        // Overhead, every λ from n to n + √(n f) needs the same storage. Of equals, the least
+        // max m_t is the best; it also keeps λ from jumping.
+        Objective::Storage => common + s.ln() + t.ln() + 1e-6 * (t / (1.0 + nu)).ln(),
+        Objective::Area => common + area.ln(),
+    }
+}

@@ -1,0 +1,124 @@
+use crate::camera::Camera;
+use crate::light::Light;
+use glam::{DMat4, DVec2, DVec3, DVec4};
+
+/// Light space (Wimmer et al. 2004, §3.4) over local space: for spot lights after the light's own
+/// perspective, so that every light's beams are parallel to y.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSpace {
+    /// Rows of the projective transform from local space: x, y, z and the common divisor. y grows
+    /// towards the light.
+    pub x: DVec4,
+    pub y: DVec4,
+    pub z: DVec4,
+    pub w: DVec4,
+    /// Local position of a spot light.
+    pub apex: Option<DVec3>,
+    /// Angle between view direction and the way of the light, radians, 0 ..= π.
+    pub theta_rad: f64,
+    /// Light-space z per metre along the view, at the middle of what is seen. For directional lights
+    /// sin θ.
+    pub z_per_view_metre: f64,
+}
+
+impl LightSpace {
+    /// Light space for a view, with z following the view direction. `middle` is a local point
+    /// amid what is seen.
+    pub(crate) fn following_view(light: &Light, camera: &Camera, middle: DVec3) -> Self {
+        let view = camera.forward();
+        let Base { direction, apex } = Base::of(light, camera);
+        let (beam, slope) = match apex {
+            None => (direction, view),
+            Some(apex) => {
+                let r = middle - apex;
+                let depth = direction.dot(r);
+                // Derivative of the light's image of `middle` as it moves along the view.
+                (
+                    r.normalize(),
+                    (view - r * (direction.dot(view) / depth)) / depth,
+                )
+            }
+        };
+        let z = slope - direction * direction.dot(slope);
+        let z_per_view_metre = z.length();
+        let theta_rad = beam.dot(view).clamp(-1.0, 1.0).acos();
+        // Looking exactly along the light any z will do. Up in the picture is one that keeps
+        // still while the viewer moves.
+        let z = z
+            .try_normalize()
+            .filter(|_| beam.cross(view).length() > 1e-12)
+            .unwrap_or_else(|| {
+                let up = camera.up();
+                (up - direction * direction.dot(up))
+                    .try_normalize()
+                    .unwrap_or_else(|| direction.any_orthonormal_vector())
+            });
+        Self::new(direction, apex, z, theta_rad, z_per_view_metre)
+    }
+
+    /// Light space with an orientation that depends on the light alone.
+    pub(crate) fn fixed(light: &Light, camera: &Camera) -> Self {
+        let Base { direction, apex } = Base::of(light, camera);
+        let z = direction.any_orthonormal_vector();
+        Self::new(direction, apex, z, 0.0, 0.0)
+    }
+
+    fn new(
+        direction: DVec3,
+        apex: Option<DVec3>,
+        z: DVec3,
+        theta_rad: f64,
+        z_per_view_metre: f64,
+    ) -> Self {
+        let x = z.cross(direction);
+        let row = |axis: DVec3| axis.extend(-axis.dot(apex.unwrap_or(DVec3::ZERO)));
+        let (y, w) = match apex {
+            None => (row(-direction), DVec4::W),
+            Some(_) => (DVec4::W, row(direction)),
+        };
+        Self {
+            x: row(x),
+            y,
+            z: row(z),
+            w,
+            apex,
+            theta_rad,
+            z_per_view_metre,
+        }
+    }
+
+    /// (x, z) and y of a local point; the divisor must be positive there.
+    pub(crate) fn project(&self, p: DVec3) -> (DVec2, f64) {
+        let p = p.extend(1.0);
+        let w = self.w.dot(p);
+        (
+            DVec2::new(self.x.dot(p), self.z.dot(p)) / w,
+            self.y.dot(p) / w,
+        )
+    }
+
+    /// The rows x, y, z, w as a matrix.
+    pub(crate) fn light_from_local(&self) -> DMat4 {
+        DMat4::from_cols(self.x, self.y, self.z, self.w).transpose()
+    }
+}
+
+struct Base {
+    direction: DVec3,
+    apex: Option<DVec3>,
+}
+
+impl Base {
+    fn of(light: &Light, camera: &Camera) -> Self {
+        match *light {
+            Light::Directional { direction } => Self {
+                direction,
+                apex: None,
+            },
+            Light::Spot(spot) => Self {
+                direction: spot.direction,
+                apex: Some(spot.position - camera.eye()),
+            },
+        }
+    }
+}

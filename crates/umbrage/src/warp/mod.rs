@@ -1,0 +1,180 @@
+//! Warps: homographies of the light plane (x, z of light space) that spread texels over it.
+
+mod adaptive;
+mod light_space;
+mod psm;
+
+pub(crate) use adaptive::least_error;
+pub(crate) use light_space::LightSpace;
+pub(crate) use psm::psm;
+
+use crate::camera::Camera;
+use crate::options::Warp;
+use glam::{DMat3, DVec2, DVec3};
+
+/// A vertex of the body seen, as the light sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Light-space x and z.
+    pub xz: DVec2,
+    /// Light-space y.
+    pub y: f64,
+    /// Distance along the view, metres, > 0.
+    pub depth: f64,
+    /// Metres perpendicular to the beam, per unit of light-space x, over `depth`.
+    pub base: f64,
+    /// The same for the height over that base, per unit of light-space z.
+    pub height: f64,
+}
+
+impl Seen {
+    pub(crate) fn new(p: DVec3, space: &LightSpace, camera: &Camera) -> Self {
+        let (xz, y) = space.project(p);
+        let depth = camera.forward().dot(p);
+        let (base, height) = match space.apex {
+            None => (1.0, 1.0),
+            Some(apex) => {
+                let r = p - apex;
+                let beam = r.normalize();
+                let axis_depth = space.w.dot(p.extend(1.0));
+                let along = |axis: DVec3| (axis - beam * beam.dot(axis)) * axis_depth;
+                let [u, v] = [along(space.x.truncate()), along(space.z.truncate())];
+                let base = u.length();
+                (base, u.cross(v).length() / base)
+            }
+        };
+        Self {
+            xz,
+            y,
+            depth,
+            base: base / depth,
+            height: height / depth,
+        }
+    }
+}
+
+/// A family of one-point perspectives along z: x is divided by w(z) = 1 + ν (z − z₀)/μ, which grows
+/// from 1 at the near plane to 1 + ν at the far plane. ν = μ/λ is the warp's strength; 0 is no warp.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OnePoint {
+    /// Light-space x of the centre of projection.
+    center_x: f64,
+    /// Light-space z of the near plane.
+    z0: f64,
+    /// Depth range μ, light-space units, > 0.
+    mu: f64,
+    nearest: f64,
+    farthest: f64,
+}
+
+impl OnePoint {
+    /// The family that fits the points seen.
+    pub(crate) fn around(seen: &[Seen], space: &LightSpace) -> Self {
+        let range = |f: fn(&Seen) -> f64| {
+            seen.iter()
+                .map(f)
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
+                    (lo.min(v), hi.max(v))
+                })
+        };
+        let (x0, x1) = range(|p| p.xz.x);
+        let (z0, z1) = range(|p| p.xz.y);
+        let (nearest, farthest) = range(|p| p.depth);
+        // The viewer is local space's origin. After a spot light's perspective he may lie at or
+        // beyond infinity, so there the middle of what he sees stands in for him.
+        let center_x = if space.apex.is_some() {
+            x0.midpoint(x1)
+        } else {
+            0.0
+        };
+        // A body that is flat and parallel to the light has no depth range.
+        let mu = (z1 - z0)
+            .max(1e-9 * (x1 - x0))
+            .max(f64::MIN_POSITIVE.sqrt());
+        Self {
+            center_x,
+            z0,
+            mu,
+            nearest,
+            farthest,
+        }
+    }
+
+    /// w relative to the near plane's.
+    fn w(&self, nu: f64, z: f64) -> f64 {
+        1.0 + nu * ((z - self.z0) / self.mu)
+    }
+
+    /// Range of x/w over the points seen.
+    fn extent(&self, nu: f64, seen: &[Seen]) -> (f64, f64) {
+        seen.iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+                let x = (p.xz.x - self.center_x) / self.w(nu, p.xz.y);
+                (lo.min(x), hi.max(x))
+            })
+    }
+
+    /// The homography of strength ν, fitted to the points seen.
+    pub(crate) fn homography(&self, nu: f64, seen: &[Seen]) -> DMat3 {
+        let (lo, hi) = self.extent(nu, seen);
+        let width = (hi - lo).max(1e-9 * self.mu);
+        let per_z = nu / self.mu;
+        let w = DVec3::new(0.0, per_z, 1.0 - per_z * self.z0);
+        let x = DVec3::new(1.0, 0.0, -self.center_x);
+        let s = (x - w * lo) / width;
+        let t = DVec3::new(0.0, 1.0, -self.z0) * ((1.0 + nu) / self.mu);
+        DMat3::from_cols(s, t, w).transpose()
+    }
+
+    /// Strength ν of a warp.
+    pub(crate) fn strength(
+        &self,
+        warp: Warp,
+        seen: &[Seen],
+        space: &LightSpace,
+        camera: &Camera,
+    ) -> f64 {
+        let sin_theta = space.theta_rad.sin();
+        let (n, f) = (self.nearest, self.farthest);
+        // Light-space units per metre of the light plane; 1 for directional lights.
+        let unit = if sin_theta > 0.0 {
+            space.z_per_view_metre / sin_theta
+        } else {
+            0.0
+        };
+        let mu_metres = self.mu / unit.max(f64::MIN_POSITIVE);
+        let nu_from_metres = |lambda: f64| {
+            if lambda > 0.0 {
+                mu_metres / lambda
+            } else {
+                0.0
+            }
+        };
+        let nu_perspective = sin_theta * nu_from_metres(n);
+        match warp {
+            Warp::Unfocused | Warp::Uniform | Warp::Psm => 0.0,
+            Warp::Lambda(lambda) => self.mu / lambda,
+            Warp::Adaptive(objective) => least_error(self, seen, objective),
+            Warp::Log => nu_perspective,
+            Warp::Lispsm => {
+                let f = n + (f - n).min(mu_metres * sin_theta);
+                sin_theta * nu_from_metres(n + (n * f).sqrt())
+            }
+            Warp::Tsm { focus } => {
+                let focus = focus.unwrap_or((n * f).sqrt());
+                let focus = camera.forward() * focus;
+                let delta = space.project(focus).0.y - self.z0;
+                let is_before_light = space.w.dot(focus.extend(1.0)) > 0.0;
+                if !is_before_light || delta >= 0.8 * self.mu {
+                    return 0.0;
+                }
+                // t(δ) = 0.8 asks for λ = 0.2 μ δ/(0.8 μ − δ).
+                let nu = (0.8 * self.mu - delta) / (0.2 * delta.max(0.0));
+                // The rule itself goes on warping as the view turns into the light, where z has no
+                // direction to follow. From θ = φ on it fades out.
+                let phi = camera.tan_half_fov_y().atan();
+                nu.min(nu_perspective) * (sin_theta / phi.sin()).min(1.0)
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Largest errors of a map over a convex body, to a known tolerance.
+//!
+//! With A the footprint (metres per texel), w the projection's fourth coordinate and z the view depth,
+//! A = w·B, where B is affine in the point for parallel light, and an affine matrix over the
+//! distance from the light for a spot. So on a simplex
+//!
+//! - w/z and (spot lights) w/(r·m), with m a fixed unit vector and r the way from the light, are
+//!   ratios of linear functions: largest at corners;
+//! - ‖B‖ and ‖r × K‖/z are convex or quasi-convex: largest at corners;
+//!
+//! and products of corner maxima bound the error. Where the bound exceeds the best value known by more
+//! than the tolerance the simplex is halved. The largest error lies on a face of the body, because
+//! along a beam errors go with 1/z or r/z. For parallel light and a one-point perspective it lies on an
+//! edge: within a plane of constant w the error is quasi-convex, so it grows towards the border.
+
+use crate::aliasing::Local;
+use crate::camera::Camera;
+use crate::focus::ConvexBody;
+use crate::plan::{MapError, Rows, ShadowMap};
+use glam::DVec3;
+
+/// The reported maximum may exceed the true one by this share.
+const TOLERANCE: f64 = 0.005;
+/// Halvings after which a simplex is a point for all practical purposes.
+const MAX_DEPTH: u32 = 40;
+
+/// Values at a corner of a simplex.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    p: DVec3,
+    /// Errors s, t, worst, metres per texel over view depth.
+    errors: [f64; 3],
+    /// Distance from the light; 1 for parallel light.
+    r: f64,
+    w: f64,
+    z: f64,
+    /// Along whose direction `height` is measured: w²/height = m_t.
+    normal_t: DVec3,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Simplex {
+    /// The third corner repeats the second on an edge.
+    corners: [Corner; 3],
+    is_edge: bool,
+    depth: u32,
+}
+
+/// Buffers kept from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    corners: Vec<Corner>,
+    stack: Vec<Simplex>,
+}
+
+/// Largest errors of `map` over `body` (local space), pixels per texel: never less than the true
+/// maximum, and at most half a per cent more.
+pub(crate) fn worst_errors(
+    map: &ShadowMap,
+    body: &ConvexBody,
+    camera: &Camera,
+    scratch: &mut Scratch,
+) -> MapError {
+    let search = Search { map, camera };
+    let Scratch { corners, stack } = scratch;
+    corners.clear();
+    corners.extend(body.vertices().iter().filter_map(|&v| search.corner(v)));
+    let mut best = corners
+        .iter()
+        .fold([0f64; 3], |best, c| larger(best, c.errors));
+    // A corner that the map does not reach would be a fault of the fit; and logarithmic rows take
+    // one w out of B's second column, which leaves the largest error at a corner.
+    if corners.len() == body.vertices().len() && map.rows == Rows::Even {
+        stack.clear();
+        let simplex = |i: [usize; 3], is_edge| Simplex {
+            corners: i.map(|i| corners[i]),
+            is_edge,
+            depth: 0,
+        };
+        if search.edges_suffice() {
+            stack.extend(body.edges().map(|[a, b]| simplex([a, b, b], true)));
+        } else {
+            stack.extend(body.triangles().map(|t| simplex(t, false)));
+        }
+        let mut bounds = best;
+        while let Some(simplex) = stack.pop() {
+            search.split(&simplex, &mut best, &mut bounds, stack);
+        }
+        best = larger(best, bounds);
+    }
+    let pixel = camera.pixel_width_per_depth();
+    let [max_s, max_t, max] = best.map(|e| e / pixel);
+    MapError { max_s, max_t, max }
+}
+
+fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| a[i].max(b[i]))
+}
+
+struct Search<'a> {
+    map: &'a ShadowMap,
+    camera: &'a Camera,
+}
+
+impl Search<'_> {
+    fn corner(&self, p: DVec3) -> Option<Corner> {
+        let local = Local::at(self.map, p)?;
+        let footprint = local.footprint();
+        let z = self.camera.forward().dot(p);
+        Some(Corner {
+            p,
+            errors: [footprint.base(), footprint.height(), footprint.longest()].map(|e| e / z),
+            r: self.map.apex.map_or(1.0, |apex| p.distance(apex)),
+            w: local.w,
+            z,
+            normal_t: local.grad_t * (local.w * local.w),
+        })
+    }
+
+    /// Whether the largest errors lie on edges: parallel light and a warp along one axis.
+    fn edges_suffice(&self) -> bool {
+        let [t, w] = [1, 3].map(|i| self.map.shadow_from_local.row(i).truncate());
+        self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
+    }
+
+    fn split(
+        &self,
+        simplex: &Simplex,
+        best: &mut [f64; 3],
+        bounds: &mut [f64; 3],
+        stack: &mut Vec<Simplex>,
+    ) {
+        let bound = self.bound(simplex);
+        let is_open = |i: usize| bound[i] > best[i] * (1.0 + TOLERANCE);
+        if !(0..3).any(is_open) || simplex.depth >= MAX_DEPTH {
+            for i in 0..3 {
+                bounds[i] = bounds[i].max(bound[i].min(best[i] * (1.0 + TOLERANCE)));
+            }
+            return;
+        }
+        let [a, b, c] = simplex.corners;
+        let depth = simplex.depth + 1;
+        // Halve the longest side. View depth decides what "long" means: far away, less matters.
+        let length = |u: &Corner, v: &Corner| u.p.distance_squared(v.p) / (u.z * v.z);
+        let sides = [(a, b, c), (b, c, a), (c, a, b)];
+        let (u, v, rest) = if simplex.is_edge {
+            sides[0]
+        } else {
+            let longest = sides
+                .iter()
+                .max_by(|p, q| length(&p.0, &p.1).total_cmp(&length(&q.0, &q.1)));
+            longest.copied().unwrap_or(sides[0])
+        };
+        // The point halfway in 1/z keeps the two halves' ranges of z alike.
+        let Some(m) = self.corner(u.p.lerp(v.p, u.z / (u.z + v.z))) else {
+            return;
+        };
+        *best = larger(*best, m.errors);
+        let child = |p: Corner, q: Corner| Simplex {
+            corners: [p, q, if simplex.is_edge { q } else { rest }],
+            is_edge: simplex.is_edge,
+            depth,
+        };
+        stack.push(child(u, m));
+        stack.push(child(m, v));
+    }
+
+    /// Upper bounds for s, t and worst over a simplex.
+    fn bound(&self, simplex: &Simplex) -> [f64; 3] {
+        let corners = &simplex.corners;
+        let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
+        let w_over_z = max(&|c| c.w / c.z);
+        // m_t = w²/|w² ∇t|, and w² ∇t is affine: its length is at least its share along any
+        // fixed direction.
+        let normal = corners
+            .iter()
+            .map(|c| c.normal_t)
+            .sum::<DVec3>()
+            .normalize_or_zero();
+        let t = w_over_z
+            * max(&|c| {
+                let share = c.normal_t.dot(normal);
+                if share > 0.0 {
+                    c.w / share
+                } else {
+                    f64::INFINITY
+                }
+            });
+        let norm = |i: usize| match self.map.apex {
+            None => {
+                let affine = max(&|c| c.errors[i] * c.z / c.w);
+                let over_z = max(&|c| c.errors[i] / c.w);
+                (w_over_z * affine).min(max(&|c| c.w) * over_z)
+            }
+            Some(apex) => {
+                let middle = corners
+                    .iter()
+                    .map(|c| c.p - apex)
+                    .sum::<DVec3>()
+                    .normalize_or_zero();
+                let share = max(&|c| {
+                    let along = (c.p - apex).dot(middle);
+                    if along > 0.0 {
+                        c.w / along
+                    } else {
+                        f64::INFINITY
+                    }
+                });
+                share * max(&|c| c.errors[i] * c.r / c.w)
+            }
+        };
+        [norm(0), t, norm(2)]
+    }
+}
