@@ -37,6 +37,7 @@ mod options;
 mod plan;
 mod planner;
 mod resolution;
+pub mod visibility;
 mod warp;
 mod worst;
 

@@ -1,0 +1,144 @@
+use crate::Ray;
+use glam::{DVec3, Vec3A};
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
+use obvhs::ray::RayHit;
+use obvhs::{BvhBuildParams, fast_stack};
+use std::time::Duration;
+use umbrage::Aabb;
+
+/// A tree of boxes that finds the primitives a ray may meet, and never misses one.
+///
+/// The tree works in single precision, around a centre in double precision, and every ray is moved
+/// to where it enters the outermost box first. With D the diagonal of that box, all coordinates are
+/// then below D/2 and all distances below D, and the errors of the box test are at most: ½·2⁻²⁴ D
+/// for the ray's origin, 2⁻²³ D for directions near an axis (obvhs bounds 1/d by 2²³), and 4·2⁻²⁴ D
+/// for the roundings of 1/d, d, difference and product. Padding every box by 2⁻²¹ D, more than their
+/// sum, makes the test conservative.
+pub(crate) struct Boxes {
+    center: DVec3,
+    outermost: Aabb,
+    tree: Bvh2,
+}
+
+impl Boxes {
+    /// The tree for primitives with these indices and boxes, none empty. `slack` widens all boxes,
+    /// for errors that the caller makes.
+    pub(crate) fn build(primitives: &[(u32, Aabb)], slack: f64) -> Self {
+        let all = primitives
+            .iter()
+            .fold(Aabb::EMPTY, |all, (_, b)| all.union(*b));
+        if all.is_empty() {
+            return Self {
+                center: DVec3::ZERO,
+                outermost: all,
+                tree: Bvh2::default(),
+            };
+        }
+        let center = all.center();
+        let pad = all.size().length() * 2f64.powi(-21) + slack;
+        let padded: Vec<_> = primitives
+            .iter()
+            .map(|(_, b)| {
+                let min = (b.min - center - pad).as_vec3();
+                let max = (b.max - center + pad).as_vec3();
+                let down = min.to_array().map(f32::next_down);
+                let up = max.to_array().map(f32::next_up);
+                obvhs::aabb::Aabb {
+                    min: Vec3A::from(down),
+                    max: Vec3A::from(up),
+                }
+            })
+            .collect();
+        // The triangle test in double precision costs more than a box: small leaves.
+        let parameters = BvhBuildParams {
+            max_prims_per_leaf: 4,
+            ..BvhBuildParams::medium_build()
+        };
+        let mut tree = build_bvh2(&padded, parameters, &mut Duration::default());
+        tree.max_depth = depth(&tree);
+        for slot in &mut tree.primitive_indices {
+            *slot = primitives[*slot as usize].0;
+        }
+        let outermost = Aabb {
+            min: all.min - 2.0 * pad,
+            max: all.max + 2.0 * pad,
+        };
+        Self {
+            center,
+            outermost,
+            tree,
+        }
+    }
+
+    /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`, roughly
+    /// nearest first. `visit` returns where the search ends from then on, or `None` to stop.
+    pub(crate) fn visit(
+        &self,
+        ray: Ray,
+        range: [f64; 2],
+        mut visit: impl FnMut(u32) -> Option<f64>,
+    ) {
+        let Some([start, end]) = clip(self.outermost, ray, range) else {
+            return;
+        };
+        let length = ray.direction.length();
+        let entry = ray.origin + ray.direction * start - self.center;
+        // Nearest rounding may round down; the next float cannot be too near.
+        let distance = |t: f64| (((t - start) * length) as f32).next_up();
+        let single = obvhs::ray::Ray::new(
+            entry.as_vec3a(),
+            (ray.direction / length).as_vec3a(),
+            0.0,
+            distance(end),
+        );
+        let leaf = |node: &Bvh2Node, single: &mut obvhs::ray::Ray, _: &mut RayHit| {
+            let slots = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            for &primitive in &self.tree.primitive_indices[slots] {
+                match visit(primitive) {
+                    Some(end) => single.tmax = single.tmax.min(distance(end)),
+                    None => return false,
+                }
+            }
+            true
+        };
+        fast_stack!(u32, (48, 192), self.tree.max_depth, stack, {
+            self.tree
+                .ray_traverse_dynamic(&mut stack, single, &mut RayHit::none(), leaf);
+        });
+    }
+}
+
+/// The part of `range` in which the ray is inside the box.
+fn clip(aabb: Aabb, ray: Ray, range: [f64; 2]) -> Option<[f64; 2]> {
+    let [mut start, mut end] = range;
+    for axis in 0..3 {
+        let (o, d) = (ray.origin[axis], ray.direction[axis]);
+        let (min, max) = (aabb.min[axis], aabb.max[axis]);
+        if d == 0.0 {
+            if !(min..=max).contains(&o) {
+                return None;
+            }
+        } else {
+            let (a, b) = ((min - o) / d, (max - o) / d);
+            start = start.max(a.min(b));
+            end = end.min(a.max(b));
+        }
+    }
+    (start <= end && start.is_finite()).then_some([start, end])
+}
+
+/// Inner nodes on the longest way down: the most that a traversal's stack can hold.
+fn depth(tree: &Bvh2) -> usize {
+    let mut deepest = 1;
+    let mut open = vec![(0usize, 1usize)];
+    while let Some((index, depth)) = open.pop() {
+        let node = &tree.nodes[index];
+        if !node.is_leaf() {
+            deepest = deepest.max(depth + 1);
+            let first = node.first_index as usize;
+            open.extend([(first, depth + 1), (first + 1, depth + 1)]);
+        }
+    }
+    deepest
+}

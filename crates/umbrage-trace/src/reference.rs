@@ -1,0 +1,198 @@
+use crate::{Error, Progress, Ray, Sample, Tracer};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use umbrage::visibility::{Filter, texel_coordinates, visibility};
+use umbrage::{Camera, Plan, ShadowMap};
+
+/// A shadow map's depths, each found by a ray through its texel's centre.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthMap {
+    resolution: [u32; 2],
+    gutter: u32,
+    texels: Vec<f32>,
+}
+
+impl DepthMap {
+    /// Casts a ray from the light's side along the beam of each texel of `map`, and of `gutter` more
+    /// texels all around it, which filters look into at the map's border.
+    ///
+    /// A texel holds the depth of the first hit, clamped to [0, 1]: what lies between the receivers
+    /// and the light is flattened onto depth 0 (Lloyd et al. 2006, §6.4), what lies behind them does
+    /// not matter. Where nothing is hit it holds 1. `progress` is told of each row, gutter included.
+    ///
+    /// # Errors
+    /// A map that does not fit into memory.
+    pub fn render(
+        tracer: &Tracer<'_>,
+        map: &ShadowMap,
+        gutter: u32,
+        progress: Progress<'_>,
+    ) -> Result<Self, Error> {
+        let resolution = map.resolution;
+        if map.is_empty() {
+            return Ok(Self {
+                resolution: [0, 0],
+                gutter: 0,
+                texels: Vec::new(),
+            });
+        }
+        let [width, height] = resolution.map(|n| n as usize + 2 * gutter as usize);
+        let mut texels = Vec::new();
+        let count = width
+            .checked_mul(height)
+            .ok_or(Error::Memory { resolution })?;
+        texels
+            .try_reserve_exact(count)
+            .map_err(|_| Error::Memory { resolution })?;
+        texels.resize(count, 1.0);
+        texels
+            .par_chunks_mut(width)
+            .enumerate()
+            .for_each(|(row, texels)| {
+                for (column, texel) in texels.iter_mut().enumerate() {
+                    let center = DVec2::new(column as f64, row as f64) + 0.5 - f64::from(gutter);
+                    *texel = depth_at(tracer, map, center).unwrap_or(1.0);
+                }
+                progress(1);
+            });
+        Ok(Self {
+            resolution,
+            gutter,
+            texels,
+        })
+    }
+
+    /// Rows that [`render`](Self::render) will report.
+    pub fn rows(map: &ShadowMap, gutter: u32) -> u64 {
+        if map.is_empty() {
+            0
+        } else {
+            u64::from(map.resolution[1]) + 2 * u64::from(gutter)
+        }
+    }
+
+    /// Texels in s and t, without the gutter.
+    pub fn resolution(&self) -> [u32; 2] {
+        self.resolution
+    }
+
+    /// Depth of texel (`i`, `j`); the nearest one that there is for indices beyond the gutter, 1 in a
+    /// map without texels.
+    pub fn texel(&self, i: i32, j: i32) -> f32 {
+        if self.texels.is_empty() {
+            return 1.0;
+        }
+        let gutter = i64::from(self.gutter);
+        let clamp = |index: i32, n: u32| {
+            (i64::from(index) + gutter).clamp(0, i64::from(n) + 2 * gutter - 1) as usize
+        };
+        let width = (self.resolution[0] + 2 * self.gutter) as usize;
+        self.texels[clamp(j, self.resolution[1]) * width + clamp(i, self.resolution[0])]
+    }
+}
+
+/// Depth of the first hit along the beam through a point in texel coordinates.
+fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
+    let [width, height] = map.resolution.map(f64::from);
+    let st = DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height));
+    let beam = map.beam(st)?;
+    let ray = Ray {
+        origin: beam.origin,
+        direction: beam.direction,
+    };
+    let hit = tracer.closest(ray, [-beam.reach_back, f64::INFINITY])?;
+    let depth = map.project(tracer.position(&hit)).map_or(1.0, |p| p.z);
+    Some(depth.clamp(0.0, 1.0) as f32)
+}
+
+/// A plan, executed: its maps' depths, and lookups into them.
+#[derive(Clone, Debug)]
+pub struct Reference<'a> {
+    plan: &'a Plan,
+    filter: Filter,
+    maps: Vec<DepthMap>,
+}
+
+/// A place in one of a plan's maps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapTexel {
+    /// Index into [`Plan::maps`].
+    pub map: usize,
+    /// Texel coordinates: texel (i, j) spans [i, i+1] × [j, j+1].
+    pub texel: DVec2,
+}
+
+impl<'a> Reference<'a> {
+    /// Renders the depths of all maps, with the gutter that `filter` needs. `progress` is told of
+    /// each row of texels; there are [`rows`](Self::rows).
+    ///
+    /// # Errors
+    /// A map that does not fit into memory.
+    pub fn render(
+        tracer: &Tracer<'_>,
+        plan: &'a Plan,
+        filter: Filter,
+        progress: Progress<'_>,
+    ) -> Result<Self, Error> {
+        let render = |map| DepthMap::render(tracer, map, filter.reach_texels(), progress);
+        let maps = plan.maps.iter().map(render).collect::<Result<_, _>>()?;
+        Ok(Self { plan, filter, maps })
+    }
+
+    /// Rows of texels that [`render`](Self::render) will report.
+    pub fn rows(plan: &Plan, filter: Filter) -> u64 {
+        plan.maps
+            .iter()
+            .map(|m| DepthMap::rows(m, filter.reach_texels()))
+            .sum()
+    }
+
+    /// The maps' depths, in the plan's order.
+    pub fn depth_maps(&self) -> &[DepthMap] {
+        &self.maps
+    }
+
+    /// How much of the light the shadow maps let through to a sample, in [0, 1]; 0 for surfaces that
+    /// face away from it, 1 for those that no map holds.
+    pub fn visibility(&self, camera: &Camera, sample: &Sample) -> f32 {
+        if !sample.is_facing {
+            return 0.0;
+        }
+        let surface = &sample.surface;
+        let Some(index) = self.map_at(camera, surface.position) else {
+            return 1.0;
+        };
+        let map = &self.plan.maps[index];
+        map.receiver(surface.position, surface.geometric_normal)
+            .map_or(1.0, |receiver| {
+                visibility(map, self.filter, &receiver, |i, j| {
+                    self.maps[index].texel(i, j)
+                })
+            })
+    }
+
+    /// The map that serves a point, and where in it the point lies; `None` if no map does.
+    pub fn texel(&self, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
+        map_texel(self.plan, camera, world_position)
+    }
+
+    fn map_at(&self, camera: &Camera, world_position: DVec3) -> Option<usize> {
+        self.texel(camera, world_position).map(|t| t.map)
+    }
+}
+
+/// The first of the plan's maps that serves a point's depth and holds it.
+fn map_texel(plan: &Plan, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
+    plan.maps
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| m.serves(camera, world_position))
+        .find_map(|(index, map)| {
+            let st = map.project(world_position)?.truncate();
+            let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
+            is_inside.then(|| MapTexel {
+                map: index,
+                texel: texel_coordinates(map, st),
+            })
+        })
+}

@@ -1,0 +1,237 @@
+use crate::{Error, Progress, Ray, Surface, Tracer};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::ops::Range;
+use umbrage::{Camera, Light};
+
+/// Samples held at a time, about: some 100 MB.
+const BAND_SAMPLES: u64 = 1 << 19;
+
+/// What a picture shows and how finely it is sampled: who looks, in which light, with how many rays.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    tracer: &'a Tracer<'a>,
+    camera: Camera,
+    light: Light,
+    grid: u32,
+}
+
+/// The surfaces seen in a band of a picture's rows.
+#[derive(Clone, Debug)]
+pub struct Band {
+    rows: Range<u32>,
+    width: u32,
+    grid: u32,
+    samples: Vec<Option<Sample>>,
+}
+
+/// A point of a surface that the camera sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Where, and what it looks like.
+    pub surface: Surface,
+    /// Distance along the view direction, metres.
+    pub depth: f64,
+    /// Whether the seen side of the triangle faces the light and is within its reach (a spot light's
+    /// cone and range): if not it is dark, whatever any shadow map says. Decided by the geometric
+    /// normal, for the triangle is what casts and receives.
+    pub is_facing: bool,
+}
+
+impl<'a> View<'a> {
+    /// Each pixel is sampled on a regular grid of `grid` × `grid` points; one is at its centre.
+    ///
+    /// # Errors
+    /// A grid that is not 1 to 64.
+    pub fn new(
+        tracer: &'a Tracer<'a>,
+        camera: Camera,
+        light: Light,
+        grid: u32,
+    ) -> Result<Self, Error> {
+        if !(1..=64).contains(&grid) {
+            return Err(Error::Samples {
+                given: grid,
+                max: 64,
+            });
+        }
+        Ok(Self {
+            tracer,
+            camera,
+            light,
+            grid,
+        })
+    }
+
+    /// Who looks.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// In which light.
+    pub fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// At what.
+    pub fn tracer(&self) -> &'a Tracer<'a> {
+        self.tracer
+    }
+
+    /// Bands of rows that make up the picture from top to bottom, each so small that its samples fit
+    /// into memory whatever the picture's size.
+    pub fn bands(&self) -> impl Iterator<Item = Range<u32>> + use<> {
+        let [width, height] = self.camera.image();
+        let samples_per_row = u64::from(width) * u64::from(self.grid).pow(2);
+        let rows = (BAND_SAMPLES / samples_per_row).clamp(1, u64::from(height)) as u32;
+        (0..height)
+            .step_by(rows as usize)
+            .map(move |first| first..height.min(first + rows))
+    }
+
+    /// What is seen in these rows, clipped to the picture.
+    pub fn band(&self, rows: Range<u32>, progress: Progress<'_>) -> Band {
+        let [width, height] = self.camera.image();
+        let rows = rows.start.min(height)..rows.end.min(height);
+        let samples = rows
+            .clone()
+            .into_par_iter()
+            .flat_map_iter(|y| {
+                let row: Vec<_> = (0..width).flat_map(|x| self.pixel(x, y)).collect();
+                progress(1);
+                row
+            })
+            .collect();
+        Band {
+            rows,
+            width,
+            grid: self.grid,
+            samples,
+        }
+    }
+
+    fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Option<Sample>> {
+        let grid = self.grid;
+        (0..grid * grid).map(move |i| {
+            let within = DVec2::new(f64::from(i % grid) + 0.5, f64::from(i / grid) + 0.5);
+            self.sample(DVec2::new(f64::from(x), f64::from(y)) + within / f64::from(grid))
+        })
+    }
+
+    /// What is seen at a point of the picture, in pixels as for [`Camera::ray`]. Nearer than the
+    /// camera's near distance nothing is; beyond its far distance surfaces are seen, but no shadow
+    /// map serves them.
+    pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
+        let ray = Ray {
+            origin: self.camera.eye(),
+            direction: self.camera.ray(pixel),
+        };
+        let hit = self
+            .tracer
+            .closest(ray, [self.camera.near(), f64::INFINITY])?;
+        let surface = self.tracer.surface(&hit, ray.direction);
+        let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
+        // The ray has unit depth, so its parameter is the depth.
+        Some(Sample {
+            surface,
+            depth: hit.t,
+            is_facing,
+        })
+    }
+
+    /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
+    ///
+    /// For a spot light only what lies beyond its `near` distance casts, as [`umbrage::SpotLight`]
+    /// has it; and nothing nearer than that receives a shadow.
+    pub fn truth(&self, sample: &Sample) -> f32 {
+        if !sample.is_facing {
+            return 0.0;
+        }
+        let position = sample.surface.position;
+        let (direction, end) = match self.light {
+            Light::Directional { direction } => (-direction, f64::INFINITY),
+            Light::Spot(spot) => {
+                let to_light = spot.position - position;
+                let depth = -spot.direction.normalize_or_zero().dot(to_light);
+                (to_light, 1.0 - spot.near / depth)
+            }
+        };
+        let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
+        f32::from(u8::from(!is_dark))
+    }
+}
+
+impl Band {
+    /// The rows of the picture.
+    pub fn rows(&self) -> Range<u32> {
+        self.rows.clone()
+    }
+
+    /// All samples, pixel by pixel from the left and row by row, grid × grid in each pixel (row by
+    /// row as well); `None` where the sky shows.
+    pub fn samples(&self) -> &[Option<Sample>] {
+        &self.samples
+    }
+
+    /// Samples per pixel.
+    pub fn samples_per_pixel(&self) -> usize {
+        (self.grid * self.grid) as usize
+    }
+
+    /// A value for each sample, in their order, computed on all threads; `Default` for the sky.
+    pub fn map<T: Default + Send>(
+        &self,
+        value: impl Fn(&Sample) -> T + Sync,
+        progress: Progress<'_>,
+    ) -> Vec<T> {
+        let row = self.width as usize * self.samples_per_pixel();
+        self.samples
+            .par_chunks(row)
+            .flat_map_iter(|samples| {
+                let row: Vec<T> = samples
+                    .iter()
+                    .map(|s| s.as_ref().map_or_else(T::default, &value))
+                    .collect();
+                progress(1);
+                row
+            })
+            .collect()
+    }
+
+    /// The mean of `values`, one a sample, over those samples of each pixel that face the light and
+    /// lie within `far` metres of depth; `None` where there are none, so that the pixel does not
+    /// count.
+    ///
+    /// # Panics
+    /// Unless there is one value a sample.
+    pub fn means_facing(&self, values: &[f32], far: f64) -> Vec<Option<f32>> {
+        assert_eq!(values.len(), self.samples.len(), "one value a sample");
+        let per_pixel = self.samples_per_pixel();
+        let pixels = self.samples.chunks(per_pixel).zip(values.chunks(per_pixel));
+        pixels
+            .map(|(samples, values)| {
+                let counted = samples
+                    .iter()
+                    .zip(values)
+                    .filter(|(s, _)| s.is_some_and(|s| s.is_facing && s.depth <= far));
+                let (sum, count) = counted.fold((0.0, 0u32), |(sum, n), (_, v)| (sum + v, n + 1));
+                (count > 0).then(|| sum / count as f32)
+            })
+            .collect()
+    }
+}
+
+fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
+    let to_light = light.direction_to_light(position);
+    if normal.dot(to_light) <= 0.0 {
+        return false;
+    }
+    match light {
+        Light::Directional { .. } => true,
+        Light::Spot(spot) => {
+            let axis = spot.direction.normalize_or_zero();
+            let depth = axis.dot(position - spot.position);
+            depth <= spot.range && -axis.dot(to_light) >= spot.half_angle_rad.cos()
+        }
+    }
+}

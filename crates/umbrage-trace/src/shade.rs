@@ -1,0 +1,176 @@
+//! Samples as pictures: in the light of a sun and a sky, or as data to look at.
+
+use crate::{Band, MapTexel, Sample, View};
+use glam::{DVec2, DVec3, Vec3};
+use umbrage::{Camera, Light};
+
+/// Light of the sun or lamp on a surface that faces it. Linear, in units of display white, as all
+/// colours here; chosen so that white paper in the sun is just below display white, and its shadow
+/// clearly darker and bluish.
+const SUN: Vec3 = Vec3::new(1.42, 1.33, 1.18);
+/// Light of the sky on a surface that faces up, and of the ground on one that faces down.
+const SKY_LIGHT: Vec3 = Vec3::new(0.25, 0.31, 0.41);
+const GROUND_LIGHT: Vec3 = Vec3::new(0.15, 0.135, 0.12);
+const ZENITH: Vec3 = Vec3::new(0.16, 0.33, 0.68);
+const HORIZON: Vec3 = Vec3::new(0.72, 0.80, 0.88);
+/// The sky below the horizon, where no ground is in the way.
+const NADIR: Vec3 = Vec3::new(0.34, 0.34, 0.34);
+const GLOW: Vec3 = Vec3::new(0.30, 0.24, 0.14);
+
+/// The picture of a band, one sRGB colour a pixel. `visibility` has one value a sample, as
+/// [`Band::map`] makes it with [`View::truth`] or [`Reference::visibility`](crate::Reference::visibility).
+///
+/// # Panics
+/// Unless there is one value a sample.
+pub fn picture(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<[u8; 3]> {
+    assert_eq!(visibility.len(), band.samples().len(), "one value a sample");
+    let per_pixel = band.samples_per_pixel();
+    let width = view.camera().image()[0] as usize;
+    let first_row = f64::from(band.rows().start);
+    let pixels = band
+        .samples()
+        .chunks(per_pixel)
+        .zip(visibility.chunks(per_pixel));
+    pixels
+        .enumerate()
+        .map(|(i, (samples, visibility))| {
+            let sum: Vec3 = samples
+                .iter()
+                .zip(visibility)
+                .map(|(sample, &visibility)| match sample {
+                    Some(s) => radiance(view.light(), s, visibility),
+                    None => {
+                        let corner = DVec2::new((i % width) as f64, (i / width) as f64 + first_row);
+                        sky(view.light(), view.camera(), corner + 0.5)
+                    }
+                })
+                // Compressing before averaging keeps edges against bright sky smooth.
+                .map(compress)
+                .sum();
+            encode(sum / per_pixel as f32)
+        })
+        .collect()
+}
+
+/// Linear colour of a surface: diffuse, in the light that reaches it, the sky's and the ground's.
+pub fn radiance(light: &Light, sample: &Sample, visibility: f32) -> Vec3 {
+    let surface = &sample.surface;
+    let normal = surface.shading_normal;
+    let to_light = light.direction_to_light(surface.position);
+    let incidence = normal.dot(to_light).max(0.0) as f32;
+    let direct = SUN * (incidence * visibility * attenuation(light, surface.position));
+    // Brighter on the light's side, as sky and ground are, so that shapes show in the shade too.
+    let side = DVec3::new(to_light.x, 0.0, to_light.z);
+    let up = (0.5 + 0.5 * normal.y) as f32;
+    let ambient = GROUND_LIGHT.lerp(SKY_LIGHT, up) * (1.0 + 0.3 * normal.dot(side) as f32);
+    surface.base_color * (direct + ambient)
+}
+
+/// A lamp's light fades smoothly to nothing at the end of its range (the window of Karis, Real
+/// Shading in Unreal Engine 4, 2013, Eq. 9, without the inverse square).
+fn attenuation(light: &Light, position: DVec3) -> f32 {
+    match light {
+        Light::Directional { .. } => 1.0,
+        Light::Spot(spot) => {
+            let relative = position.distance(spot.position) / spot.range;
+            (1.0 - relative.powi(4)).max(0.0).powi(2) as f32
+        }
+    }
+}
+
+/// Linear colour of the sky at a point of the picture, pixels.
+pub fn sky(light: &Light, camera: &Camera, pixel: DVec2) -> Vec3 {
+    let direction = camera.ray(pixel).normalize();
+    let height = direction.y as f32;
+    let gradient = if height >= 0.0 {
+        HORIZON.lerp(ZENITH, 1.0 - (1.0 - height).powi(3))
+    } else {
+        HORIZON.lerp(NADIR, 1.0 - (1.0 + height).powi(12))
+    };
+    let glow = match light {
+        Light::Directional { direction: travel } => {
+            (-travel.normalize_or_zero().dot(direction)).max(0.0) as f32
+        }
+        Light::Spot(_) => 0.0,
+    };
+    gradient + GLOW * glow.powi(6)
+}
+
+/// Khronos's PBR Neutral tone mapper (Khronos Group, 2024): leaves colours below 0.8 as they are,
+/// but for the 0.04 that a dielectric's reflection would add, and compresses highlights.
+fn compress(color: Vec3) -> Vec3 {
+    const START: f32 = 0.8 - 0.04;
+    const DESATURATION: f32 = 0.15;
+    let color = color.max(Vec3::ZERO);
+    let low = color.min_element();
+    let offset = if low < 0.08 {
+        low - 6.25 * low * low
+    } else {
+        0.04
+    };
+    let color = color - offset;
+    let peak = color.max_element();
+    if peak < START {
+        return color;
+    }
+    let room = 1.0 - START;
+    let new_peak = 1.0 - room * room / (peak + room - START);
+    let gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    (color * (new_peak / peak)).lerp(Vec3::splat(new_peak), gray)
+}
+
+/// 8-bit sRGB (IEC 61966-2-1) of a linear colour.
+fn encode(linear: Vec3) -> [u8; 3] {
+    linear.to_array().map(|c| {
+        let c = c.clamp(0.0, 1.0);
+        let srgb = if c <= 0.003_130_8 {
+            12.92 * c
+        } else {
+            1.055 * c.powf(1.0 / 2.4) - 0.055
+        };
+        (srgb * 255.0).round() as u8
+    })
+}
+
+/// A direction as a colour: each coordinate from −1 to 1 as 0 to 255.
+pub fn normal_color(normal: DVec3) -> [u8; 3] {
+    (normal * 0.5 + 0.5)
+        .to_array()
+        .map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+/// Depth (metres) as grey, from white at the camera's near distance to black at its far one, by the
+/// logarithm, so that equal ratios are equal steps.
+pub fn depth_color(camera: &Camera, depth: f64) -> [u8; 3] {
+    let relative = (depth / camera.near()).ln() / (camera.far() / camera.near()).ln();
+    [((1.0 - relative.clamp(0.0, 1.0)) * 255.0).round() as u8; 3]
+}
+
+/// A colour for each of a plan's maps, light enough to be multiplied with a picture.
+pub fn partition_color(map: usize) -> [u8; 3] {
+    // Okabe and Ito's palette, told apart by the colour-blind too, lightened.
+    const COLORS: [[u8; 3]; 7] = [
+        [242, 198, 96],
+        [136, 204, 240],
+        [96, 198, 164],
+        [246, 238, 130],
+        [102, 164, 218],
+        [232, 146, 96],
+        [222, 162, 196],
+    ];
+    COLORS[map % COLORS.len()]
+}
+
+/// The texel grid as a chequerboard in the map's colour: squares of one texel, within squares of
+/// sixteen that show the grid where single texels are too small to see.
+pub fn texel_color(place: &MapTexel) -> [u8; 3] {
+    let square = |size: f64| {
+        let cell = (place.texel / size).floor();
+        (cell.x + cell.y).rem_euclid(2.0)
+    };
+    let brightness = 0.35 + 0.4 * square(1.0) + 0.25 * square(16.0);
+    partition_color(place.map).map(|c| (f64::from(c) * brightness).round() as u8)
+}
+
+/// The colour of what no map serves, and of the sky, in pictures of data.
+pub const NOTHING: [u8; 3] = [24, 24, 28];

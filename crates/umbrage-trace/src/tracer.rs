@@ -1,0 +1,516 @@
+use crate::boxes::Boxes;
+use crate::triangle::{ShearedRay, TriangleHit};
+use crate::{Error, Ray};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+use umbrage::Aabb;
+use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture};
+
+/// One triangle of one instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PrimitiveRef {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Index into [`Mesh::triangles`].
+    pub triangle: u32,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, in lengths of its direction.
+    pub t: f64,
+    /// What was hit.
+    pub primitive: PrimitiveRef,
+    /// Weights of the triangle's three corners, each in [0, 1]; they sum to 1.
+    pub barycentrics: [f64; 3],
+}
+
+/// A point on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// The triangle it lies on.
+    pub primitive: PrimitiveRef,
+    /// World space, metres: the triangle's own point, not one along the ray.
+    pub position: DVec3,
+    /// How far from `position` the surface may have been meant to be, metres: its corners are
+    /// stored in single precision, and every step from there to here rounds.
+    pub position_error: f64,
+    /// The triangle's normal, unit length, world space, turned towards where it was seen from.
+    pub geometric_normal: DVec3,
+    /// The corners' normals, interpolated, unit length, world space, turned to the side of
+    /// `geometric_normal`.
+    pub shading_normal: DVec3,
+    /// Texture coordinates; zero if the mesh has none.
+    pub uv: Vec2,
+    /// Linear red, green, blue.
+    pub base_color: Vec3,
+}
+
+/// A scene, ready for rays.
+///
+/// Two levels: a tree of boxes for each mesh, in mesh space, and one over the instances, so drawing a
+/// mesh a hundred times costs the memory of one. Triangles are tested in double precision, in mesh
+/// space, by a test that lets no ray through between neighbours (`ShearedRay`), and the single
+/// precision boxes are padded for all rounding there is (`Boxes`): no hit is ever lost, as long as
+/// rays start within 10⁷ or so scene sizes of the scene.
+///
+/// All triangles are seen and cast from both sides. A surface that alpha masks away is not there at
+/// all. Triangles without area are ignored.
+pub struct Tracer<'a> {
+    scene: &'a Scene,
+    /// One a mesh.
+    meshes: Vec<MeshBoxes<'a>>,
+    /// One an instance.
+    placements: Vec<Placement>,
+    instances: Boxes,
+    bounds: Aabb,
+    opaque: bool,
+}
+
+struct MeshBoxes<'a> {
+    boxes: Boxes,
+    mask: Option<Mask<'a>>,
+}
+
+/// Where a surface is not, although its triangle is.
+struct Mask<'a> {
+    cutoff: f32,
+    factor: f32,
+    texture: Option<&'a Texture>,
+}
+
+/// An instance's transform, split into what rays need.
+struct Placement {
+    mesh: usize,
+    world_from_mesh: DAffine3,
+    /// Takes directions, and positions relative to the instance's own.
+    mesh_from_world: DMat3,
+    /// Bound of how much the transform stretches any vector.
+    stretch: f64,
+}
+
+/// A ray leaving a surface.
+#[derive(Clone, Copy)]
+struct Departure {
+    from: PrimitiveRef,
+    position_error: f64,
+}
+
+impl<'a> Tracer<'a> {
+    /// Builds the trees. Takes about a second per million stored triangles and thread.
+    ///
+    /// # Errors
+    /// A scene whose indices are out of range, whose coordinates are not finite or beyond 10¹²
+    /// metres, or whose transforms cannot be inverted.
+    pub fn new(scene: &'a Scene) -> Result<Self, Error> {
+        for (i, mesh) in scene.meshes.iter().enumerate() {
+            check_mesh(mesh, i, scene)?;
+        }
+        let placements = scene
+            .instances
+            .iter()
+            .enumerate()
+            .map(|(i, _)| Placement::new(scene, i))
+            .collect::<Result<Vec<_>, _>>()?;
+
+        let mesh_bounds: Vec<Aabb> = scene.meshes.par_iter().map(Mesh::bounds).collect();
+        let placed = placements.iter().map(|p| p.bounds(mesh_bounds[p.mesh]));
+        let placed: Vec<Aabb> = placed.collect();
+        let bounds = placed.iter().fold(Aabb::EMPTY, |all, &b| all.union(b));
+        let beyond =
+            |b: &Aabb| !b.is_empty() && !(b.min.abs().max(b.max.abs()).max_element() <= 1e12);
+        if let Some(i) = placed.iter().position(beyond) {
+            let problem = "must lie within 1e12 metres of the origin";
+            return Err(Error::scene(format!("instances[{i}]"), problem));
+        }
+
+        // Rays are taken to mesh space with an error of a few roundings of the distance they come
+        // from; bound it by 32 roundings of the scene's size.
+        let size = if bounds.is_empty() {
+            0.0
+        } else {
+            bounds.size().length()
+        };
+        let mut slack = vec![0.0f64; scene.meshes.len()];
+        for p in &placements {
+            let shrink = frobenius_norm(p.mesh_from_world);
+            slack[p.mesh] = slack[p.mesh].max(shrink * size * 2f64.powi(-48));
+        }
+        let meshes = scene.meshes.par_iter().zip(slack);
+        let meshes = meshes
+            .map(|(mesh, slack)| MeshBoxes::build(mesh, slack, scene))
+            .collect();
+        let farthest = if bounds.is_empty() {
+            DVec3::ZERO
+        } else {
+            bounds.min.abs().max(bounds.max.abs())
+        };
+        let boxes: Vec<(u32, Aabb)> = (0..).zip(placed).filter(|(_, b)| !b.is_empty()).collect();
+        let instances = Boxes::build(&boxes, farthest.length() * 2f64.powi(-48));
+        Ok(Self {
+            scene,
+            meshes,
+            placements,
+            instances,
+            bounds,
+            opaque: false,
+        })
+    }
+
+    /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
+    #[must_use]
+    pub fn opaque(self, opaque: bool) -> Self {
+        Self { opaque, ..self }
+    }
+
+    /// The scene that rays are traced in.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// A box around everything drawn, metres, world space; [`Aabb::EMPTY`] without triangles.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// The first hit with `range[0] ≤ t < range[1]`; either end may be infinite. Of hits at equal t
+    /// the one with the smallest [`PrimitiveRef`]. `None` also for rays that are not finite.
+    pub fn closest(&self, ray: Ray, range: [f64; 2]) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        self.visit(ray, range, |primitive, hit| {
+            let nearer = best.is_none_or(|b| (hit.t, primitive) < (b.t, b.primitive));
+            if nearer && hit.t >= range[0] && hit.t < range[1] && self.is_there(primitive, hit) {
+                best = Some(Hit {
+                    t: hit.t,
+                    primitive,
+                    barycentrics: hit.weights,
+                });
+            }
+            Some(best.map_or(range[1], |b| b.t))
+        });
+        best
+    }
+
+    /// Whether anything is hit with `range[0] ≤ t < range[1]`.
+    pub fn occluded(&self, ray: Ray, range: [f64; 2]) -> bool {
+        self.any(ray, range, None)
+    }
+
+    /// Whether anything lies in `direction` from a surface, nearer than `end` lengths of
+    /// `direction`.
+    ///
+    /// The surface does not hide itself, and no epsilon is needed for that: its own triangle is
+    /// skipped, and so is every other triangle in whose plane the point lies as far as can be known.
+    /// Those are neighbours met at an edge, copies of the triangle, and coplanar decals. "Can be
+    /// known" is the sum of both surfaces' [`position_error`](Surface::position_error): how far
+    /// storing corners in single precision moves a surface, 2⁻²³ of its mesh's coordinates, plus some
+    /// 2⁻⁵⁰ of its world position.
+    pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
+        let departure = Departure {
+            from: surface.primitive,
+            position_error: surface.position_error,
+        };
+        self.any(
+            Ray {
+                origin: surface.position,
+                direction,
+            },
+            [0.0, end],
+            Some(departure),
+        )
+    }
+
+    /// World position of a hit, metres: the triangle's own point, not one along the ray.
+    pub fn position(&self, hit: &Hit) -> DVec3 {
+        let placement = &self.placements[hit.primitive.instance as usize];
+        let corners = self.corners(hit.primitive);
+        placement
+            .world_from_mesh
+            .transform_point3(weigh(corners, hit.barycentrics))
+    }
+
+    /// All about the surface at a hit, as seen from a ray travelling in `view_direction`.
+    pub fn surface(&self, hit: &Hit, view_direction: DVec3) -> Surface {
+        let Hit {
+            primitive,
+            barycentrics,
+            ..
+        } = *hit;
+        let placement = &self.placements[primitive.instance as usize];
+        let mesh = &self.scene.meshes[placement.mesh];
+        let corners = self.corners(primitive);
+        let position = self.position(hit);
+        let world_normal = |mesh_normal: DVec3| {
+            (placement.mesh_from_world.transpose() * mesh_normal).try_normalize()
+        };
+        let plane = normal_of(corners);
+        let geometric_normal = world_normal(plane / plane.abs().max_element())
+            .map_or(-view_direction, |n| {
+                if n.dot(view_direction) > 0.0 { -n } else { n }
+            });
+        let indices = mesh.triangles[primitive.triangle as usize].map(|i| i as usize);
+        let shading_normal = (!mesh.normals.is_empty())
+            .then(|| weigh(indices.map(|i| mesh.normals[i].as_dvec3()), barycentrics))
+            .and_then(world_normal)
+            .filter(|n| n.is_finite())
+            .map_or(geometric_normal, |n| {
+                if n.dot(geometric_normal) < 0.0 { -n } else { n }
+            });
+        let uv = texture_coordinates(mesh, primitive, barycentrics);
+        let material = &self.scene.materials[mesh.material];
+        let texture = self.texture(material, mesh);
+        let color = texture.map_or(Vec3::ONE, |t| t.sample(uv).truncate());
+        Surface {
+            primitive,
+            position,
+            position_error: placement.position_error(corners, position),
+            geometric_normal,
+            shading_normal,
+            uv,
+            base_color: material.base_color.truncate() * color,
+        }
+    }
+
+    fn texture(&self, material: &Material, mesh: &Mesh) -> Option<&'a Texture> {
+        texture_of(self.scene, material, mesh)
+    }
+
+    fn corners(&self, primitive: PrimitiveRef) -> [DVec3; 3] {
+        let mesh = &self.scene.meshes[self.placements[primitive.instance as usize].mesh];
+        corners(mesh, primitive.triangle)
+    }
+
+    fn any(&self, ray: Ray, range: [f64; 2], departure: Option<Departure>) -> bool {
+        let mut found = false;
+        self.visit(ray, range, |primitive, hit| {
+            found = hit.t >= range[0]
+                && hit.t < range[1]
+                && departure.is_none_or(|d| !self.is_left_behind(d, ray.origin, primitive))
+                && self.is_there(primitive, hit);
+            (!found).then_some(range[1])
+        });
+        found
+    }
+
+    /// Whether the ray started on this very triangle, or in its plane as far as can be known.
+    fn is_left_behind(&self, d: Departure, origin: DVec3, primitive: PrimitiveRef) -> bool {
+        if primitive == d.from {
+            return true;
+        }
+        let placement = &self.placements[primitive.instance as usize];
+        let corners = self.corners(primitive);
+        let local = placement.mesh_from_world * (origin - placement.world_from_mesh.translation);
+        let plane = normal_of(corners);
+        // The distance from the plane in world space: n·(a − o) is the same number in every space.
+        let world_plane = placement.mesh_from_world.transpose() * plane;
+        let distance = plane.dot(corners[0] - local).abs();
+        let error = d.position_error + placement.position_error(corners, origin);
+        distance <= error * world_plane.length()
+    }
+
+    /// Whether alpha leaves the surface there.
+    fn is_there(&self, primitive: PrimitiveRef, hit: &TriangleHit) -> bool {
+        let index = self.placements[primitive.instance as usize].mesh;
+        let Some(mask) = self.meshes[index].mask.as_ref().filter(|_| !self.opaque) else {
+            return true;
+        };
+        let uv = texture_coordinates(&self.scene.meshes[index], primitive, hit.weights);
+        mask.factor * mask.texture.map_or(1.0, |t| t.sample_alpha(uv)) >= mask.cutoff
+    }
+
+    /// Shows `visit` every triangle the ray meets, and some beyond the range; `visit` returns where
+    /// the search ends from then on, or `None` to stop.
+    fn visit(
+        &self,
+        ray: Ray,
+        range: [f64; 2],
+        mut visit: impl FnMut(PrimitiveRef, &TriangleHit) -> Option<f64>,
+    ) {
+        let is_ray =
+            ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != DVec3::ZERO;
+        if !is_ray || !(range[0] < range[1]) {
+            return;
+        }
+        let mut end = range[1];
+        self.instances.visit(ray, range, |instance| {
+            let placement = &self.placements[instance as usize];
+            let mesh = &self.scene.meshes[placement.mesh];
+            let local = Ray {
+                origin: placement.mesh_from_world
+                    * (ray.origin - placement.world_from_mesh.translation),
+                direction: placement.mesh_from_world * ray.direction,
+            };
+            let sheared = ShearedRay::new(local);
+            let mut stopped = false;
+            self.meshes[placement.mesh]
+                .boxes
+                .visit(local, [range[0], end], |triangle| {
+                    if let Some(hit) = sheared.intersect(corners(mesh, triangle)) {
+                        match visit(PrimitiveRef { instance, triangle }, &hit) {
+                            Some(nearer) => end = nearer,
+                            None => stopped = true,
+                        }
+                    }
+                    (!stopped).then_some(end)
+                });
+            (!stopped).then_some(end)
+        });
+    }
+}
+
+impl<'a> MeshBoxes<'a> {
+    fn build(mesh: &'a Mesh, slack: f64, scene: &'a Scene) -> Self {
+        let boxes: Vec<(u32, Aabb)> = (0..mesh.triangles.len() as u32)
+            .map(|i| (i, corners(mesh, i)))
+            .filter(|&(_, c)| normal_of(c) != DVec3::ZERO)
+            .map(|(i, c)| (i, Aabb::around(c)))
+            .collect();
+        let material = &scene.materials[mesh.material];
+        let mask = match material.alpha {
+            Alpha::Opaque => None,
+            Alpha::Mask { cutoff } => Some(Mask {
+                cutoff,
+                factor: material.base_color.w,
+                texture: texture_of(scene, material, mesh),
+            }),
+        };
+        Self {
+            boxes: Boxes::build(&boxes, slack),
+            mask,
+        }
+    }
+}
+
+impl Placement {
+    fn new(scene: &Scene, index: usize) -> Result<Self, Error> {
+        let instance = &scene.instances[index];
+        let wrong = |field: &str, problem: &str| {
+            Err(Error::scene(format!("instances[{index}].{field}"), problem))
+        };
+        if instance.mesh >= scene.meshes.len() {
+            return wrong("mesh", "names a mesh that does not exist");
+        }
+        let world_from_mesh = instance.world_from_mesh;
+        let mesh_from_world = world_from_mesh.matrix3.inverse();
+        if !world_from_mesh.is_finite() || !mesh_from_world.is_finite() {
+            return wrong("world_from_mesh", "must be finite and invertible");
+        }
+        let stretch = frobenius_norm(world_from_mesh.matrix3);
+        Ok(Self {
+            mesh: instance.mesh,
+            world_from_mesh,
+            mesh_from_world,
+            stretch,
+        })
+    }
+
+    fn bounds(&self, mesh_bounds: Aabb) -> Aabb {
+        if mesh_bounds.is_empty() {
+            return Aabb::EMPTY;
+        }
+        Aabb::around(
+            mesh_bounds
+                .corners()
+                .map(|c| self.world_from_mesh.transform_point3(c)),
+        )
+    }
+
+    /// How far from `position` its triangle may have been meant to be, metres.
+    ///
+    /// Each coordinate of a corner was rounded by up to 2⁻²⁴ of itself when it was stored, a corner
+    /// thus moved by up to √3·2⁻²⁴ of the largest coordinate, and the triangle by as much. The steps in
+    /// double precision (interpolation, transform and back) are some ten roundings of 2⁻⁵³ of the
+    /// mesh's and the world's coordinates; the former vanish beside 2⁻²⁴, the latter do not far from
+    /// the origin.
+    fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
+        let largest = corners
+            .iter()
+            .fold(DVec3::ZERO, |m, c| m.max(c.abs()))
+            .max_element();
+        let world =
+            position.abs().max_element() + self.world_from_mesh.translation.abs().max_element();
+        largest * self.stretch * 2f64.powi(-23) + world * 2f64.powi(-49)
+    }
+}
+
+fn corners(mesh: &Mesh, triangle: u32) -> [DVec3; 3] {
+    mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3())
+}
+
+/// The triangle's normal, twice its area long, in its own space.
+fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a)
+}
+
+fn weigh([a, b, c]: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
+    a * weights[0] + b * weights[1] + c * weights[2]
+}
+
+fn texture_coordinates(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) -> Vec2 {
+    if mesh.uvs.is_empty() {
+        return Vec2::ZERO;
+    }
+    let [a, b, c] =
+        mesh.triangles[primitive.triangle as usize].map(|i| mesh.uvs[i as usize].as_dvec2());
+    (a * weights[0] + b * weights[1] + c * weights[2]).as_vec2()
+}
+
+/// The texture of a material on a mesh that has coordinates for it.
+fn texture_of<'a>(scene: &'a Scene, material: &Material, mesh: &Mesh) -> Option<&'a Texture> {
+    let id = material
+        .base_color_texture
+        .filter(|_| !mesh.uvs.is_empty())?;
+    Some(&scene.textures[id.0])
+}
+
+fn frobenius_norm(m: DMat3) -> f64 {
+    m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
+    let wrong = |field: String, problem: String| {
+        Err(Error::scene(format!("meshes[{index}].{field}"), problem))
+    };
+    let count = mesh.positions.len();
+    if let Some(i) = mesh
+        .positions
+        .iter()
+        .position(|p| !p.is_finite() || p.abs().max_element() > 1e12)
+    {
+        return wrong(
+            format!("positions[{i}]"),
+            "must be finite and at most 1e12".into(),
+        );
+    }
+    for (field, length) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
+        if length != 0 && length != count {
+            let problem = format!("has {length} entries for {count} positions");
+            return wrong(field.into(), problem);
+        }
+    }
+    if u32::try_from(mesh.triangles.len()).is_err() {
+        return wrong("triangles".into(), "must be fewer than 2^32".into());
+    }
+    let out_of_range = |t: &[u32; 3]| t.iter().any(|&i| i as usize >= count);
+    if let Some(i) = mesh.triangles.iter().position(out_of_range) {
+        return wrong(
+            format!("triangles[{i}]"),
+            format!("must index {count} positions"),
+        );
+    }
+    let Some(material) = scene.materials.get(mesh.material) else {
+        return wrong(
+            "material".into(),
+            "names a material that does not exist".into(),
+        );
+    };
+    if material
+        .base_color_texture
+        .is_some_and(|t| t.0 >= scene.textures.len())
+    {
+        let place = format!("materials[{}].base_color_texture", mesh.material);
+        return Err(Error::scene(place, "names a texture that does not exist"));
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! The shadow test and its filters, as pure functions over whatever holds the depths.
+
+use crate::error::{Error, check};
+use crate::plan::{Receiver, ShadowMap};
+use glam::DVec2;
+use std::fmt;
+
+/// How the texels around a point are looked up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Filter {
+    /// The nearest texel.
+    #[default]
+    Hard,
+    /// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the share of lit texels in a box
+    /// of n × n texels centred at the point. The box is exact: texels count by the area of theirs
+    /// that it covers, so (n + 1)² of them are compared, which is what n × n bilinear comparisons of
+    /// a GPU see.
+    Pcf {
+        /// Width of the box, texels, 1 to [`MAX_PCF`](Self::MAX_PCF), even or odd.
+        n: u32,
+    },
+}
+
+impl Filter {
+    /// Widest box of [`Pcf`](Self::Pcf), texels.
+    pub const MAX_PCF: u32 = 15;
+
+    /// Percentage-closer filtering over `n` × `n` texels.
+    ///
+    /// # Errors
+    /// If `n` is not 1 to [`MAX_PCF`](Self::MAX_PCF).
+    pub fn pcf(n: u32) -> Result<Self, Error> {
+        check((1..=Self::MAX_PCF).contains(&n), "filter.n", || {
+            format!("must be 1 to {} texels, is {n}", Self::MAX_PCF)
+        })?;
+        Ok(Self::Pcf { n })
+    }
+
+    /// How many texels beyond the map's border lookups of points in the map can reach.
+    pub fn reach_texels(self) -> u32 {
+        match self {
+            Self::Hard => 0,
+            Self::Pcf { n } => n / 2 + 1,
+        }
+    }
+}
+
+/// As in a shadow specification: `hard`, `pcf5`.
+impl fmt::Display for Filter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Hard => f.write_str("hard"),
+            Self::Pcf { n } => write!(f, "pcf{n}"),
+        }
+    }
+}
+
+/// Where shadow coordinates lie in the map's texels: texel (i, j) spans [i, i+1] × [j, j+1].
+pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
+    let [width, height] = map.resolution.map(f64::from);
+    DVec2::new(st.x * width, map.rows.row_from_t(st.y) * height)
+}
+
+/// How much of the light reaches `receiver`, from 0 to 1, by the depths of `map`'s texels. `fetch`
+/// gives the depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
+/// Receivers outside the map are lit.
+pub fn visibility(
+    map: &ShadowMap,
+    filter: Filter,
+    receiver: &Receiver,
+    fetch: impl Fn(i32, i32) -> f32,
+) -> f32 {
+    let st = receiver.st;
+    let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
+    if map.is_empty() || !is_inside {
+        return 1.0;
+    }
+    let is_lit = |i, j| f64::from(fetch(i, j)) >= nearest_lit(map, receiver, i, j);
+    let texel = texel_coordinates(map, st);
+    match filter {
+        Filter::Hard => {
+            let last = |n: u32| f64::from(n - 1);
+            let i = texel.x.floor().min(last(map.resolution[0]));
+            let j = texel.y.floor().min(last(map.resolution[1]));
+            f32::from(u8::from(is_lit(i as i32, j as i32)))
+        }
+        Filter::Pcf { n } => {
+            let columns = Span::new(texel.x, n);
+            let rows = Span::new(texel.y, n);
+            let row_sum = |j| columns.sum(|i| f64::from(u8::from(is_lit(i, j))));
+            (rows.sum(row_sum) / f64::from(n * n)) as f32
+        }
+    }
+}
+
+/// The depth from which on a texel does not hide the receiver.
+fn nearest_lit(map: &ShadowMap, receiver: &Receiver, i: i32, j: i32) -> f64 {
+    let [width, height] = map.resolution.map(f64::from);
+    let center = DVec2::new(
+        (f64::from(i) + 0.5) / width,
+        map.rows.t_from_row((f64::from(j) + 0.5) / height),
+    );
+    let rise = receiver.slope.dot(center - receiver.st);
+    if rise.is_nan() { return f64::NEG_INFINITY; }
+    let plane = receiver.depth + rise;
+    let r = match *VARIANT {
+        0 => plane,
+        1 => plane.min(receiver.depth),
+        2 => receiver.depth,
+        _ => plane.max(receiver.depth),
+    };
+    r.min(1.0) - f64::from(f32::EPSILON) / 4.0 - rise.abs() * 1e-12
+}
+
+static VARIANT: std::sync::LazyLock<u32> = std::sync::LazyLock::new(|| {
+    std::env::var("VARIANT").ok().and_then(|v| v.parse().ok()).unwrap_or(1)
+});
+
+/// One side of a box filter: the texels it covers, the first and the last in part.
+struct Span {
+    first: i32,
+    n: u32,
+    /// How much of the first texel is left out, and of the last one covered, in [0, 1).
+    fraction: f64,
+}
+
+impl Span {
+    fn new(center: f64, n: u32) -> Self {
+        let start = center - f64::from(n) / 2.0;
+        let first = start.floor();
+        Self { first: first as i32, n, fraction: start - first }
+    }
+
+    /// Sum of `value` over the texels, weighted by how much of each is covered; in all n.
+    fn sum(&self, value: impl Fn(i32) -> f64) -> f64 {
+        let last = self.first + self.n as i32;
+        let inner: f64 = (self.first + 1..last).map(&value).sum();
+        let start = (1.0 - self.fraction) * value(self.first);
+        let end = if self.fraction > 0.0 { self.fraction * value(last) } else { 0.0 };
+        start + inner + end
+    }
+}
