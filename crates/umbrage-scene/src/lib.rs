@@ -6,11 +6,13 @@
 
 mod builtin;
 mod error;
+mod load;
 mod texture;
 mod types;
 
 pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;
+pub use load::load;
 pub use types::{
     Alpha, Instance, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture, TextureId,
     Wrap,

@@ -150,25 +150,43 @@ impl Scene {
         self.meshes.iter().map(|m| m.triangles.len() as u64).sum()
     }
 
-    /// The box around everything drawn, metres, world space; [`Aabb::EMPTY`] without triangles.
+    /// The box around everything drawn, metres, world space, exact to rounding; [`Aabb::EMPTY`]
+    /// without triangles. Costs a pass over the vertices of every instance that is turned.
     pub fn bounds(&self) -> Aabb {
         let boxes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
-        self.instances.iter().fold(Aabb::EMPTY, |all, i| {
-            let b = boxes[i.mesh];
-            if b.is_empty() {
-                return all;
+        let mut all = Aabb::EMPTY;
+        for i in &self.instances {
+            if boxes[i.mesh].is_empty() {
+                continue;
             }
-            all.union(Aabb::around(
-                b.corners().map(|c| i.world_from_mesh.transform_point3(c)),
-            ))
-        })
+            let m = i.world_from_mesh.matrix3;
+            // Boxes stay boxes under scaling, mirroring and swapping of axes.
+            let keeps_axes = [m.x_axis, m.y_axis, m.z_axis]
+                .iter()
+                .all(|a| a.to_array().iter().filter(|&&c| c != 0.0).count() == 1);
+            let to_world = |p| i.world_from_mesh.transform_point3(p);
+            all = all.union(if keeps_axes {
+                Aabb::around(boxes[i.mesh].corners().map(to_world))
+            } else {
+                self.meshes[i.mesh].bounds_in(to_world)
+            });
+        }
+        all
     }
 }
 
 impl Mesh {
     /// The box around the triangles' corners, metres, mesh space.
     pub fn bounds(&self) -> Aabb {
-        let corners = self.triangles.iter().flatten();
-        Aabb::around(corners.map(|&i| self.positions[i as usize].as_dvec3()))
+        self.bounds_in(|p| p)
+    }
+
+    fn bounds_in(&self, dst_from_mesh: impl Fn(DVec3) -> DVec3) -> Aabb {
+        let mut used = vec![false; self.positions.len()];
+        for &i in self.triangles.iter().flatten() {
+            used[i as usize] = true;
+        }
+        let corners = self.positions.iter().zip(used).filter(|(_, used)| *used);
+        Aabb::around(corners.map(|(p, _)| dst_from_mesh(p.as_dvec3())))
     }
 }

@@ -1,0 +1,258 @@
+use super::uri;
+use crate::error::SceneError;
+use crate::types::Notice;
+use gltf::json::{Index, Root, root::Get};
+use std::borrow::Cow;
+use std::fmt::Display;
+use std::io::Read;
+use std::path::Path;
+
+/// A scene file's JSON and the bytes it refers to.
+///
+/// Indices of the JSON may point anywhere: the schema types of the crate `gltf` are used without
+/// its wrappers and readers, which panic on broken files. Everything is looked up through
+/// [`get`](Self::get).
+pub(super) struct Document<'a> {
+    pub(super) path: &'a Path,
+    pub(super) root: Root,
+    /// In the order of the JSON, each at least as long as the JSON says.
+    buffers: Vec<Cow<'a, [u8]>>,
+}
+
+impl<'a> Document<'a> {
+    /// `bytes` is the content of the file at `path`.
+    pub(super) fn parse(path: &'a Path, bytes: &'a [u8]) -> Result<Self, SceneError> {
+        let fail = |place: &str, problem: String| SceneError::Invalid {
+            path: path.into(),
+            place: place.into(),
+            problem,
+        };
+        let (json, blob) = match bytes.strip_prefix(b"glTF") {
+            None => (Cow::Borrowed(bytes), None),
+            Some(rest) => {
+                // The length field: the crate trusts it to be at least the header's own.
+                let length = rest
+                    .get(4..8)
+                    .map(|b| u32::from_le_bytes(b.try_into().unwrap()));
+                match length {
+                    None => return Err(fail("header", "the file ends within it".into())),
+                    Some(n) if n < 20 || n as usize > bytes.len() => {
+                        let has = bytes.len();
+                        return Err(fail(
+                            "header",
+                            format!("says that the file has {n} bytes, it has {has}"),
+                        ));
+                    }
+                    Some(_) => {}
+                }
+                let glb = gltf::Glb::from_slice(bytes)
+                    .map_err(|e| fail("chunks", format!("not binary glTF 2.0: {e}")))?;
+                (glb.json, glb.bin)
+            }
+        };
+        let root: Root = gltf::json::deserialize::from_slice(&json)
+            .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
+        let mut document = Self {
+            path,
+            root,
+            buffers: Vec::new(),
+        };
+        document.check_asset()?;
+        document.buffers = document.load_buffers(blob)?;
+        Ok(document)
+    }
+
+    fn check_asset(&self) -> Result<(), SceneError> {
+        let asset = &self.root.asset;
+        let needs = asset.min_version.as_ref().unwrap_or(&asset.version);
+        if !(needs == "2" || needs.starts_with("2.")) {
+            let problem = format!("is {needs:?}, only glTF 2 can be read");
+            return Err(self.invalid("asset.version", problem));
+        }
+        // Extensions that change what a surface looks like beyond its base colour are harmless.
+        let known = |e: &str| {
+            e.starts_with("KHR_materials_")
+                || [
+                    "KHR_lights_punctual",
+                    "KHR_texture_transform",
+                    "KHR_mesh_quantization",
+                    "EXT_mesh_gpu_instancing",
+                ]
+                .contains(&e)
+        };
+        match self.root.extensions_required.iter().find(|e| !known(e)) {
+            Some(e) => Err(self.invalid(
+                "extensionsRequired",
+                format!("{e} is not supported: export the file without it"),
+            )),
+            None => Ok(()),
+        }
+    }
+
+    fn load_buffers(
+        &self,
+        mut blob: Option<Cow<'a, [u8]>>,
+    ) -> Result<Vec<Cow<'a, [u8]>>, SceneError> {
+        let mut buffers = Vec::with_capacity(self.root.buffers.len());
+        for (i, buffer) in self.root.buffers.iter().enumerate() {
+            let place = format!("buffers[{i}]");
+            let bytes = match &buffer.uri {
+                Some(uri) => Cow::Owned(self.fetch(uri, &place)?),
+                None => blob.take().ok_or_else(|| {
+                    self.invalid(&place, "has no uri, and there is no binary chunk for it")
+                })?,
+            };
+            let (needs, has) = (buffer.byte_length.0, bytes.len() as u64);
+            if has < needs {
+                let problem = format!("is cut off: it should have {needs} bytes, it has {has}");
+                return Err(self.invalid(&place, problem));
+            }
+            buffers.push(bytes);
+        }
+        Ok(buffers)
+    }
+
+    /// What a URI of the file refers to.
+    pub(super) fn fetch(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
+        if let Some(data) = uri.strip_prefix("data:") {
+            return uri::decode_data(data).map_err(|problem| self.invalid(place, problem));
+        }
+        let folder = match self.path.parent() {
+            Some(p) if p != Path::new("") => p,
+            _ => Path::new("."),
+        };
+        let file = uri::file_below(folder, uri).map_err(|problem| self.invalid(place, problem))?;
+        read_file(&file)
+    }
+
+    /// The bytes of a buffer view.
+    pub(super) fn view(
+        &self,
+        index: Index<gltf::json::buffer::View>,
+        place: &str,
+    ) -> Result<&[u8], SceneError> {
+        let view = self.get(index, place)?;
+        let buffer = self.buffers.get(view.buffer.value()).ok_or_else(|| {
+            self.invalid(
+                place,
+                format!("there is no buffers[{}]", view.buffer.value()),
+            )
+        })?;
+        let start = view.byte_offset.map_or(0, |o| o.0);
+        let range = usize::try_from(start).ok().zip(
+            start
+                .checked_add(view.byte_length.0)
+                .and_then(|end| usize::try_from(end).ok()),
+        );
+        range
+            .and_then(|(start, end)| buffer.get(start..end))
+            .ok_or_else(|| {
+                self.invalid(
+                    &format!("bufferViews[{}]", index.value()),
+                    format!(
+                        "{} bytes from {start} on do not fit into the buffer's {}",
+                        view.byte_length.0,
+                        buffer.len()
+                    ),
+                )
+            })
+    }
+
+    /// What an index found at `place` points to.
+    pub(super) fn get<T>(&self, index: Index<T>, place: &str) -> Result<&T, SceneError>
+    where
+        Root: Get<T>,
+    {
+        let found = Get::<T>::get(&self.root, index);
+        found.ok_or_else(|| self.invalid(place, format!("index {} points nowhere", index.value())))
+    }
+
+    pub(super) fn invalid(&self, place: &str, problem: impl Into<String>) -> SceneError {
+        SceneError::Invalid {
+            path: self.path.into(),
+            place: place.into(),
+            problem: problem.into(),
+        }
+    }
+}
+
+/// The content of a plain file.
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let read = || {
+        let file = std::fs::File::open(path)?;
+        let metadata = file.metadata()?;
+        if !metadata.is_file() {
+            return Err(std::io::Error::other("is not a file"));
+        }
+        let mut bytes = Vec::with_capacity(usize::try_from(metadata.len()).unwrap_or(0));
+        // A file that grows meanwhile, or lies about its length, stays within what it promised.
+        file.take(metadata.len()).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    read().map_err(|source| SceneError::Read {
+        path: path.into(),
+        source,
+    })
+}
+
+/// Repairs, those of one kind collected into one sentence.
+#[derive(Default)]
+pub(super) struct Notices {
+    entries: Vec<Entry>,
+}
+
+struct Entry {
+    what: String,
+    first: String,
+    places: usize,
+    items: usize,
+}
+
+impl Notices {
+    /// Something repaired at `place`.
+    pub(super) fn add(&mut self, place: impl Display, what: impl Into<String>) {
+        self.count(place, 0, what);
+    }
+
+    /// `items` things repaired at `place`; nothing if there are none.
+    pub(super) fn add_some(&mut self, place: impl Display, items: usize, what: &str) {
+        if items > 0 {
+            self.count(place, items, what);
+        }
+    }
+
+    fn count(&mut self, place: impl Display, items: usize, what: impl Into<String>) {
+        let what = what.into();
+        match self.entries.iter_mut().find(|e| e.what == what) {
+            Some(e) => {
+                e.places += 1;
+                e.items += items;
+            }
+            None => {
+                let first = place.to_string();
+                self.entries.push(Entry {
+                    what,
+                    first,
+                    places: 1,
+                    items,
+                });
+            }
+        }
+    }
+
+    pub(super) fn finish(self) -> Vec<Notice> {
+        let sentence = |e: Entry| {
+            let others = match e.places {
+                1 => String::new(),
+                n => format!(" and {} more", n - 1),
+            };
+            let items = if e.items > 0 {
+                format!("{} ", e.items)
+            } else {
+                String::new()
+            };
+            Notice(format!("{}{others}: {items}{}", e.first, e.what))
+        };
+        self.entries.into_iter().map(sentence).collect()
+    }
+}

@@ -1,0 +1,153 @@
+//! Cameras and lights.
+
+use super::document::{Document, Notices};
+use crate::error::SceneError;
+use crate::types::{SceneCamera, SceneLight};
+use glam::{DAffine3, DVec3, Vec3};
+use gltf::json::extensions::scene::khr_lights_punctual::Type;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, camera};
+use umbrage::{Aabb, Light, SpotLight};
+
+/// Widest half angle of a spot light, radians: that of [`SpotLight::half_angle_rad`].
+const MAX_HALF_ANGLE_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
+
+/// Shadows of spot lights begin at this share of their range: a centimetre for a lamp of 10 m.
+const SPOT_NEAR_SHARE: f64 = 1e-3;
+
+/// The camera of a node, or `None` with a notice if it cannot be one of ours. `bounds` are the
+/// scene's: where they end, an endless view ends.
+pub(super) fn load_camera(
+    document: &Document,
+    index: Index<camera::Camera>,
+    node_name: Option<&str>,
+    world_from_node: &DAffine3,
+    bounds: Aabb,
+    notices: &mut Notices,
+) -> Result<Option<SceneCamera>, SceneError> {
+    let place = format!("cameras[{}]", index.value());
+    let json = document.get(index, &place)?;
+    let Some(perspective) = &json.perspective else {
+        notices.add(&place, "is not a perspective camera, left out");
+        return Ok(None);
+    };
+    let m = world_from_node.matrix3;
+    let (Some(forward), Some(up)) = ((-m.z_axis).try_normalize(), m.y_axis.try_normalize()) else {
+        notices.add(&place, "its node has no direction (scale 0), left out");
+        return Ok(None);
+    };
+    let eye = world_from_node.translation;
+    let (fov, near) = (f64::from(perspective.yfov), f64::from(perspective.znear));
+    let far = match perspective.zfar {
+        Some(far) => f64::from(far),
+        None => farthest(bounds, |p| forward.dot(p - eye)).max(2.0 * near),
+    };
+    let valid = fov > 0.0 && fov < std::f64::consts::PI - 1e-6 && near > 0.0 && far > near;
+    if !valid || !far.is_finite() {
+        notices.add(&place, "needs 0 < yfov < π and 0 < znear < zfar, left out");
+        return Ok(None);
+    }
+    Ok(Some(SceneCamera {
+        name: json
+            .name
+            .as_deref()
+            .or(node_name)
+            .unwrap_or_default()
+            .into(),
+        eye,
+        // As far away as the view is long: the direction survives rounding anywhere.
+        target: eye + forward * far,
+        up,
+        fov_y_rad: fov,
+        near,
+        far,
+    }))
+}
+
+/// The light of a node, or `None` with a notice if it has no direction.
+pub(super) fn load_light(
+    document: &Document,
+    index: usize,
+    node_name: Option<&str>,
+    world_from_node: &DAffine3,
+    bounds: Aabb,
+    notices: &mut Notices,
+) -> Result<Option<SceneLight>, SceneError> {
+    let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
+    let lights = document
+        .root
+        .extensions
+        .as_ref()
+        .and_then(|e| e.khr_lights_punctual.as_ref());
+    let Some(json) = lights.and_then(|l| l.lights.get(index)) else {
+        return Err(document.invalid(&place, "does not exist, but a node shines with it"));
+    };
+    let Checked::Valid(kind) = json.type_ else {
+        return Err(document.invalid(&place, "type must be directional, point or spot"));
+    };
+    let color = Vec3::from(json.color);
+    if !color.is_finite() || !json.intensity.is_finite() || json.range.is_some_and(f32::is_nan) {
+        return Err(document.invalid(&place, "colour, intensity or range is not finite"));
+    }
+    let direction = (-world_from_node.matrix3.z_axis).try_normalize();
+    let light = match (kind, direction) {
+        (Type::Point, _) => None,
+        (_, None) => {
+            notices.add(&place, "its node has no direction (scale 0), left out");
+            return Ok(None);
+        }
+        (Type::Directional, Some(direction)) => Some(Light::Directional { direction }),
+        (Type::Spot, Some(direction)) => {
+            let Some(cone) = &json.spot else {
+                return Err(document.invalid(&place, "is a spot light without a cone"));
+            };
+            let position = world_from_node.translation;
+            let outer = f64::from(cone.outer_cone_angle);
+            if !(outer > 0.0 && outer <= MAX_HALF_ANGLE_RAD) {
+                notices.add(
+                    &place,
+                    "outerConeAngle must lie above 0° and at most at 85°, moved there",
+                );
+            }
+            let range = match json.range.map(f64::from) {
+                Some(range) if range > 0.0 && range.is_finite() => range,
+                _ => farthest(bounds, |p| p.distance(position)).max(1e-3),
+            };
+            Some(Light::Spot(SpotLight {
+                position,
+                direction,
+                // NaN, too, becomes the narrowest.
+                half_angle_rad: outer.max(1e-3).min(MAX_HALF_ANGLE_RAD),
+                near: range * SPOT_NEAR_SHARE,
+                range,
+            }))
+        }
+    };
+    let color = color.max(Vec3::ZERO);
+    let brightest = color.max_element();
+    Ok(Some(SceneLight {
+        name: json
+            .name
+            .as_deref()
+            .or(node_name)
+            .unwrap_or_default()
+            .into(),
+        light,
+        color: if brightest > 0.0 {
+            color / brightest
+        } else {
+            Vec3::ONE
+        },
+        intensity: (json.intensity * brightest).max(0.0),
+    }))
+}
+
+/// The largest value that `distance` has in a box, a little rounded up.
+fn farthest(bounds: Aabb, distance: impl Fn(DVec3) -> f64) -> f64 {
+    bounds
+        .corners()
+        .into_iter()
+        .map(distance)
+        .fold(0.0, f64::max)
+        * 1.01
+}
