@@ -1,0 +1,415 @@
+//! What the template shows, put into words.
+
+use super::Page;
+use super::chart::{self, Line, Tick};
+use super::numbers::{count, duration_ms, percent, plain, significant, vector};
+use super::table::{self, Cell, Column};
+use super::techniques::description;
+use crate::{Error, LightInfo, Measured, Pictures, Report};
+use askama::Template;
+use serde::Serialize;
+
+/// The report's page. User text goes through askama's escaping; what is marked `safe` in the template
+/// is this crate's own or escaped here.
+#[derive(Template)]
+#[template(path = "report.html")]
+pub(super) struct Html<'a> {
+    css: &'static str,
+    js: &'static str,
+    /// JSON for the script, escaped for use in HTML.
+    data: String,
+    version: &'static str,
+    scene: &'a str,
+    size: [u32; 2],
+    /// Too small for smooth enlarging to be of any use.
+    small: bool,
+    facts: String,
+    finding: Finding,
+    kinds: Vec<Kind>,
+    truth: &'a Pictures,
+    truth_how: String,
+    results: Vec<Shown<'a>>,
+    columns: Vec<Column>,
+    ticks: Vec<Tick>,
+    gradient: String,
+    scale_max: String,
+    counted: String,
+    undefined: bool,
+    setup: Vec<(&'static str, String)>,
+    techniques: Vec<(String, &'static str)>,
+    notices: &'a [String],
+    command: Option<&'a str>,
+}
+
+/// The outcome in a sentence: emphasised name, then the rest.
+struct Finding {
+    name: String,
+    rest: String,
+}
+
+/// A kind of picture to look at.
+#[derive(Serialize)]
+struct Kind {
+    id: &'static str,
+    label: &'static str,
+}
+
+/// One result.
+struct Shown<'a> {
+    result: &'a Measured,
+    pictures: &'a Pictures,
+    cells: Vec<Cell>,
+    line: Line,
+    wrong: Option<String>,
+    best: bool,
+    description: Option<&'static str>,
+    /// Figures under the card's name.
+    figures: Vec<(&'static str, String)>,
+    /// Pictures that have no place of their own on the card: label and file.
+    more: Vec<(&'static str, &'a str)>,
+}
+
+impl Pictures {
+    /// Kind and name of each file.
+    pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let always = [("color", &self.color), ("visibility", &self.visibility)];
+        let some = [
+            ("difference", &self.difference),
+            ("error", &self.error),
+            ("partition", &self.partition),
+            ("texels", &self.texels),
+        ];
+        let some = some
+            .into_iter()
+            .filter_map(|(kind, file)| Some((kind, file.as_ref()?)));
+        always
+            .into_iter()
+            .chain(some)
+            .map(|(kind, file)| (kind, file.as_str()))
+    }
+}
+
+impl<'a> Html<'a> {
+    pub(super) fn new(page: &Page<'a>) -> Result<Self, Error> {
+        let Page {
+            report,
+            truth,
+            pictures,
+            scale,
+            notices,
+            command,
+        } = *page;
+        let columns = table::columns(report);
+        let mut rows: Vec<Vec<Cell>> = report.results.iter().map(|_| Vec::new()).collect();
+        for column in &columns {
+            for (row, cell) in rows.iter_mut().zip(column.cells(report)) {
+                row.push(cell);
+            }
+        }
+        let best = best(report);
+        let results: Vec<Shown<'a>> = report
+            .results
+            .iter()
+            .zip(pictures)
+            .zip(rows)
+            .zip(chart::lines(report, scale))
+            .enumerate()
+            .map(|(i, (((result, pictures), cells), line))| Shown {
+                result,
+                pictures,
+                cells,
+                line,
+                wrong: result.metrics.wrong_fraction.map(percent),
+                best: best == Some(i),
+                description: description(&result.shadows),
+                figures: figures(result),
+                more: pictures
+                    .files()
+                    .filter(|(kind, _)| ["visibility", "partition", "texels"].contains(kind))
+                    .map(|(kind, file)| (label(kind), file))
+                    .collect(),
+            })
+            .collect();
+        let kinds = kinds(pictures);
+        let [w, h] = report.size;
+        let n = results.len();
+        Ok(Self {
+            css: include_str!("../../assets/report.css"),
+            js: include_str!("../../assets/report.js"),
+            data: data(page, &kinds)?,
+            version: env!("CARGO_PKG_VERSION"),
+            scene: &report.scene,
+            size: report.size,
+            small: w < 480,
+            facts: format!(
+                "{w} × {h} pixels · {n} technique{}",
+                if n == 1 { "" } else { "s" }
+            ),
+            finding: finding(report, best),
+            kinds,
+            truth,
+            truth_how: truth_how(report),
+            results,
+            columns,
+            ticks: chart::ticks(scale),
+            gradient: chart::gradient(),
+            scale_max: significant(f64::from(scale.max())),
+            counted: counted(report),
+            undefined: report.results.iter().any(|r| r.error_px.undefined > 0),
+            setup: setup(report),
+            techniques: techniques(report),
+            notices,
+            command,
+        })
+    }
+}
+
+/// The result with the fewest wrong pixels, then the smallest mean error, if there are others.
+fn best(report: &Report) -> Option<usize> {
+    let figures = |r: &Measured| Some((r.metrics.wrong_fraction?, r.metrics.mean_abs_error?));
+    let known = report
+        .results
+        .iter()
+        .enumerate()
+        .filter_map(|(i, r)| Some((i, figures(r)?)));
+    let best = known.min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    best.map(|(i, _)| i).filter(|_| report.results.len() > 1)
+}
+
+fn finding(report: &Report, best: Option<usize>) -> Finding {
+    let wrong = |r: &Measured| r.metrics.wrong_fraction.unwrap_or(0.0);
+    let say = |r: &Measured, rest| Finding {
+        name: r.shadows.clone(),
+        rest,
+    };
+    let first = &report.results[0];
+    if first.metrics.counted == 0 {
+        return Finding {
+            name: String::new(),
+            rest: "No pixel shows a surface that faces the light: there is nothing to measure."
+                .to_owned(),
+        };
+    }
+    let Some(best) = best.map(|i| &report.results[i]) else {
+        return say(
+            first,
+            format!(
+                "shows {} % of the counted pixels wrong.",
+                percent(wrong(first))
+            ),
+        );
+    };
+    let worst = report
+        .results
+        .iter()
+        .max_by(|a, b| wrong(a).total_cmp(&wrong(b)))
+        .unwrap_or(best);
+    let closest = format!("comes closest to the truth: {} % of", percent(wrong(best)));
+    let rest = if wrong(worst) == wrong(best) {
+        format!("{closest} the counted pixels are wrong, as with all the others.")
+    } else if wrong(best) == 0.0 {
+        let worst = format!("{} gets {} % wrong", worst.shadows, percent(wrong(worst)));
+        format!("comes closest to the truth: no counted pixel is wrong; {worst}.")
+    } else {
+        let times = significant(wrong(worst) / wrong(best));
+        format!(
+            "{closest} the counted pixels are wrong. {} gets {times} times as many.",
+            worst.shadows
+        )
+    };
+    say(best, rest)
+}
+
+fn counted(report: &Report) -> String {
+    let pixels = u64::from(report.size[0]) * u64::from(report.size[1]);
+    let counted = report.results[0].metrics.counted;
+    let share = percent(counted as f64 / pixels as f64);
+    format!(
+        "{} of the {} pixels here, {share} %",
+        count(counted),
+        count(pixels)
+    )
+}
+
+fn truth_how(report: &Report) -> String {
+    let rays = match report.truth.rays_per_pixel {
+        1 => "one ray a pixel".to_owned(),
+        n => format!("{n} rays a pixel"),
+    };
+    match report.truth.seconds {
+        Some(s) => format!("{rays}, in {}", duration_ms(s * 1e3)),
+        None => rays,
+    }
+}
+
+fn label(kind: &str) -> &'static str {
+    match kind {
+        "color" => "Picture",
+        "visibility" => "Visibility",
+        "difference" => "Difference",
+        "error" => "Pixels per texel",
+        "partition" => "Maps",
+        _ => "Texels",
+    }
+}
+
+fn kinds(pictures: &[Pictures]) -> Vec<Kind> {
+    let ids = [
+        "color",
+        "visibility",
+        "difference",
+        "error",
+        "partition",
+        "texels",
+    ];
+    let shown = |id: &&str| {
+        pictures
+            .iter()
+            .flat_map(Pictures::files)
+            .any(|(kind, _)| kind == *id)
+    };
+    ids.into_iter()
+        .filter(shown)
+        .map(|id| Kind {
+            id,
+            label: label(id),
+        })
+        .collect()
+}
+
+fn figures(r: &Measured) -> Vec<(&'static str, String)> {
+    let known = |v: Option<f64>| v.map(significant);
+    let e = &r.error_px;
+    let times = r.ms.total().map(duration_ms);
+    [
+        ("Mean error", known(r.metrics.mean_abs_error)),
+        ("ꟻLIP", known(r.metrics.flip)),
+        ("Pixels per texel, median", known(e.p50)),
+        ("… 95th percentile", known(e.p95)),
+        ("Storage factor", known(r.storage_factor)),
+        ("Maps", Some(count(u64::from(r.maps)))),
+        ("Texels", Some(count(r.texels))),
+        ("Time", times),
+        ("Executed by", Some(r.backend.clone())),
+    ]
+    .into_iter()
+    .filter_map(|(name, figure)| Some((name, figure?)))
+    .collect()
+}
+
+fn setup(report: &Report) -> Vec<(&'static str, String)> {
+    let view = &report.view;
+    let named = |name: &Option<String>| {
+        name.as_ref()
+            .map(|n| format!("“{n}”, "))
+            .unwrap_or_default()
+    };
+    let mut setup = vec![
+        (
+            "Camera",
+            format!("{}at {} m", named(&view.name), vector(view.eye)),
+        ),
+        ("looks at", format!("{} m", vector(view.target))),
+        ("up", vector(view.up)),
+        ("field of view", format!("{}° vertically", plain(view.fov))),
+        (
+            "range",
+            format!("{} to {} m", significant(view.near), significant(view.far)),
+        ),
+    ];
+    match &report.light {
+        LightInfo::Directional { name, direction } => {
+            setup.push((
+                "Light",
+                format!("{}directional, travels {}", named(name), vector(*direction)),
+            ));
+        }
+        LightInfo::Spot {
+            name,
+            position,
+            direction,
+            half_angle,
+            range,
+        } => setup.extend([
+            (
+                "Light",
+                format!("{}spot at {} m", named(name), vector(*position)),
+            ),
+            (
+                "shines",
+                format!(
+                    "{}, {}° to each side",
+                    vector(*direction),
+                    plain(*half_angle)
+                ),
+            ),
+            ("reaches", format!("{} m", significant(*range))),
+        ]),
+    }
+    setup.push(("Truth", truth_how(report)));
+    setup
+}
+
+fn techniques(report: &Report) -> Vec<(String, &'static str)> {
+    let mut techniques: Vec<(String, &'static str)> = Vec::new();
+    for r in &report.results {
+        let Some(text) = description(&r.shadows) else {
+            continue;
+        };
+        if techniques.iter().all(|(_, known)| *known != text) {
+            let name = r.shadows.split(['+', ':', '@']).next().unwrap_or_default();
+            techniques.push((name.to_owned(), text));
+        }
+    }
+    techniques
+}
+
+/// What the script needs, as JSON that can stand inside an HTML `script` element.
+fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
+    #[derive(Serialize)]
+    struct Data<'a> {
+        size: [u32; 2],
+        kinds: &'a [Kind],
+        /// The truth, then the results.
+        items: Vec<Item<'a>>,
+    }
+    #[derive(Serialize)]
+    struct Item<'a> {
+        name: &'a str,
+        wrong: Option<String>,
+        spot: Option<[u32; 2]>,
+        files: std::collections::BTreeMap<&'static str, String>,
+    }
+    let item = |name, wrong: Option<f64>, pictures: &Pictures| Item {
+        name,
+        wrong: wrong.map(percent),
+        spot: pictures.worst_spot,
+        files: pictures
+            .files()
+            .map(|(kind, file)| (kind, url(file)))
+            .collect(),
+    };
+    let results = page.report.results.iter().zip(page.pictures);
+    let items = std::iter::once(item("Truth", None, page.truth))
+        .chain(results.map(|(r, p)| item(&r.shadows, r.metrics.wrong_fraction, p)));
+    let data = Data {
+        size: page.report.size,
+        kinds,
+        items: items.collect(),
+    };
+    // A string in it might close the element or open a comment.
+    Ok(serde_json::to_string(&data)?.replace('<', "\\u003c"))
+}
+
+/// A file name as a relative URL.
+fn url(file: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
+    let escape = |b: u8| {
+        if plain(b) {
+            char::from(b).to_string()
+        } else {
+            format!("%{b:02X}")
+        }
+    };
+    file.bytes().map(escape).collect()
+}
