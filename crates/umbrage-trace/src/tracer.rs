@@ -245,8 +245,8 @@ impl<'a> Tracer<'a> {
             (placement.mesh_from_world.transpose() * mesh_normal).try_normalize()
         };
         let plane = normal_of(corners);
-        let geometric_normal = world_normal(plane / plane.abs().max_element())
-            .map_or(-view_direction, |n| {
+        let geometric_normal =
+            world_normal(plane / plane.abs().max_element()).map_or(-view_direction, |n| {
                 if n.dot(view_direction) > 0.0 { -n } else { n }
             });
         let indices = mesh.triangles[primitive.triangle as usize].map(|i| i as usize);
