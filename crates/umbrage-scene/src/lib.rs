@@ -9,6 +9,7 @@ mod error;
 mod load;
 mod texture;
 mod types;
+mod view;
 
 pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;

@@ -1,0 +1,254 @@
+use crate::types::{Mesh, Scene};
+use glam::{DVec3, IVec3, USizeVec3, Vec3};
+use umbrage::Aabb;
+
+/// Cells along the longest edge of the scene's box.
+const CELLS: f64 = 160.0;
+/// Cells at least along the other edges, so that flat worlds keep their relief.
+const MIN_CELLS: f64 = 24.0;
+/// Triangles looked at; larger meshes are thinned out beyond.
+const MAX_TRIANGLES: u64 = 4_000_000;
+
+/// Directions that a cell's surfaces face, one bit each: −x, −y, −z, +x, +y, +z.
+pub(super) type Facing = u8;
+/// The bit of surfaces that face up.
+pub(super) const UP: Facing = 1 << 4;
+
+/// Which parts of a scene's box hold surfaces: a coarse picture of it, quick to make and to look
+/// around in.
+pub(super) struct Occupancy {
+    bounds: Aabb,
+    size: USizeVec3,
+    /// Metres.
+    pub(super) cell: DVec3,
+    cells: Vec<Facing>,
+    /// Lowest occupied layer of each column; `None` where there is nothing.
+    floor: Vec<Option<usize>>,
+}
+
+/// A cell that a line of sight ends at.
+pub(super) struct Sight {
+    /// In lengths of the direction looked along.
+    pub(super) distance: f64,
+    /// Index of the cell.
+    pub(super) cell: usize,
+    pub(super) facing: Facing,
+}
+
+impl Occupancy {
+    /// `bounds` must be those of the scene and not empty.
+    pub(super) fn of(scene: &Scene, bounds: Aabb) -> Self {
+        let extent = bounds.size();
+        let longest = extent.max_element().max(1e-9);
+        let size = (extent * (CELLS / longest))
+            .ceil()
+            .max(DVec3::splat(MIN_CELLS));
+        // A box without thickness still has cells.
+        let cell = extent.max(DVec3::splat(longest * 1e-6)) / size;
+        let size = size.as_usizevec3();
+        let mut grid = Self {
+            bounds,
+            size,
+            cell,
+            cells: vec![0; size.x * size.y * size.z],
+            floor: vec![None; size.x * size.z],
+        };
+        let drawn = scene.drawn_triangles();
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh];
+            let double_sided = scene
+                .materials
+                .get(mesh.material)
+                .is_some_and(|m| m.double_sided);
+            let step = if mesh.triangles.len() < 1000 {
+                1
+            } else {
+                drawn.div_ceil(MAX_TRIANGLES)
+            };
+            grid.add(mesh, instance.world_from_mesh, double_sided, step as usize);
+        }
+        for z in 0..size.z {
+            for x in 0..size.x {
+                let column = (0..size.y).find(|&y| grid.cells[grid.index(x, y, z)] != 0);
+                grid.floor[z * size.x + x] = column;
+            }
+        }
+        grid
+    }
+
+    fn add(
+        &mut self,
+        mesh: &Mesh,
+        world_from_mesh: glam::DAffine3,
+        double_sided: bool,
+        step: usize,
+    ) {
+        let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
+        for t in mesh.triangles.iter().step_by(step) {
+            let [a, b, c] = t.map(|i| {
+                let p = world_from_mesh.transform_point3(mesh.positions[i as usize].as_dvec3());
+                (p, ((p - self.bounds.min) / self.cell).as_vec3())
+            });
+            let normal = (b.0 - a.0).cross(c.0 - a.0) * if mirrored { -1.0 } else { 1.0 };
+            let mut facing = faced(normal);
+            if double_sided {
+                facing |= faced(-normal);
+            }
+            self.fill([a.1, b.1, c.1], facing);
+        }
+    }
+
+    /// Marks the cells of a triangle given in cells, by points closer than a cell.
+    fn fill(&mut self, [a, b, c]: [Vec3; 3], facing: Facing) {
+        let edges = [b - a, c - b, a - c].map(|e| e.abs().max_element());
+        let n = (edges.into_iter().fold(0.0, f32::max) * 1.5)
+            .ceil()
+            .clamp(1.0, 400.0) as u32;
+        let last = self.size - USizeVec3::ONE;
+        for i in 0..=n {
+            for j in 0..=n - i {
+                let p = a + (b - a) * (i as f32 / n as f32) + (c - a) * (j as f32 / n as f32);
+                let p = p.max(Vec3::ZERO).as_usizevec3().min(last);
+                let k = self.index(p.x, p.y, p.z);
+                self.cells[k] |= facing;
+            }
+        }
+    }
+
+    fn index(&self, x: usize, y: usize, z: usize) -> usize {
+        (z * self.size.y + y) * self.size.x + x
+    }
+
+    /// The cell around a point, if inside the box.
+    fn cell_of(&self, p: DVec3) -> Option<USizeVec3> {
+        let c = (p - self.bounds.min) / self.cell;
+        let inside = c.cmpge(DVec3::ZERO).all() && c.cmplt(self.size.as_dvec3()).all();
+        inside.then(|| c.as_usizevec3())
+    }
+
+    /// Whether there is nothing in a point's cell and those beside it.
+    pub(super) fn is_free(&self, p: DVec3) -> bool {
+        let sides = [DVec3::ZERO, DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z];
+        sides.iter().all(|d| {
+            let cell = self.cell_of(p + *d * self.cell);
+            cell.is_none_or(|c| self.cells[self.index(c.x, c.y, c.z)] == 0)
+        })
+    }
+
+    /// Height of the ground at a point's column, metres; the box's floor where there is none.
+    pub(super) fn floor_at(&self, p: DVec3) -> f64 {
+        let cell = self.cell_of(p.with_y(self.bounds.min.y));
+        let layer = cell.and_then(|c| self.floor[c.z * self.size.x + c.x]);
+        self.bounds.min.y + layer.map_or(0.0, |l| (l as f64 + 1.0) * self.cell.y)
+    }
+
+    /// The share of columns that hold anything.
+    pub(super) fn floor_share(&self) -> f64 {
+        self.floor.iter().flatten().count() as f64 / self.floor.len() as f64
+    }
+
+    /// Whether a cell lies clearly above the lowest surface of its column.
+    pub(super) fn stands_out(&self, cell: usize) -> bool {
+        let x = cell % self.size.x;
+        let y = cell / self.size.x % self.size.y;
+        let z = cell / (self.size.x * self.size.y);
+        self.floor[z * self.size.x + x].is_some_and(|floor| y > floor + 1)
+    }
+
+    /// The box around what stands out, and the height, in metres above the ground, that three
+    /// quarters of its columns stay below; `None` if nothing does.
+    pub(super) fn content(&self) -> Option<(Aabb, f64)> {
+        let mut around = Aabb::EMPTY;
+        let mut heights = Vec::new();
+        for z in 0..self.size.z {
+            for x in 0..self.size.x {
+                let Some(floor) = self.floor[z * self.size.x + x] else {
+                    continue;
+                };
+                let occupied = |&y: &usize| self.cells[self.index(x, y, z)] != 0;
+                let Some(top) = (floor + 2..self.size.y).rev().find(occupied) else {
+                    continue;
+                };
+                heights.push((top - floor) as f64 * self.cell.y);
+                let at = |x: usize, y: usize, z: usize| {
+                    self.bounds.min + USizeVec3::new(x, y, z).as_dvec3() * self.cell
+                };
+                around = around.union(Aabb {
+                    min: at(x, floor, z),
+                    max: at(x + 1, top + 1, z + 1),
+                });
+            }
+        }
+        heights.sort_by(f64::total_cmp);
+        let typical = heights.get(heights.len() * 3 / 4)?;
+        Some((around, *typical))
+    }
+
+    /// What is first seen from `eye` along `direction`, beyond the eye's own cell.
+    pub(super) fn look(&self, eye: DVec3, direction: DVec3) -> Option<Sight> {
+        let origin = (eye - self.bounds.min) / self.cell;
+        let direction = direction / self.cell;
+        let end = self.size.as_dvec3();
+        // Where the line is inside the box (slabs), then from cell to cell (Amanatides and Woo 1987).
+        let inverse = direction.recip();
+        let (a, b) = (-origin * inverse, (end - origin) * inverse);
+        let enter = a.min(b).max_element().max(0.0);
+        let leave = a.max(b).min_element();
+        if !(enter < leave) {
+            return None;
+        }
+        let start = origin + direction * (enter + (leave - enter) * 1e-9);
+        let mut at = start.floor().clamp(DVec3::ZERO, end - 1.0).as_ivec3();
+        let step = direction.signum().as_ivec3();
+        let ahead = at.as_dvec3() + direction.signum().max(DVec3::ZERO);
+        let mut next = (ahead - origin) * inverse;
+        let per_cell = inverse.abs();
+        let mut distance = enter;
+        let mut is_own = self.cell_of(eye).is_some();
+        let size = self.size.as_ivec3();
+        loop {
+            if at.cmplt(IVec3::ZERO).any() || at.cmpge(size).any() {
+                return None;
+            }
+            let cell = self.index(at.x as usize, at.y as usize, at.z as usize);
+            let facing = self.cells[cell];
+            if facing != 0 && !is_own {
+                return Some(Sight {
+                    distance,
+                    cell,
+                    facing,
+                });
+            }
+            is_own = false;
+            // NaN (a direction along a cell's face) loses against any number.
+            let axis = (0..3)
+                .min_by(|&i, &j| next[i].total_cmp(&next[j]))
+                .unwrap_or(0);
+            distance = next[axis];
+            if !distance.is_finite() {
+                return None;
+            }
+            next[axis] += per_cell[axis];
+            at[axis] += step[axis];
+        }
+    }
+}
+
+/// The bit of the axis that a direction is closest to, and those that it is nearly as close to.
+fn faced(direction: DVec3) -> Facing {
+    let longest = direction.abs().max_element();
+    let bit = |i: usize| {
+        let c = direction[i];
+        if c.abs() < 0.6 * longest || longest == 0.0 {
+            0
+        } else {
+            1 << (if c < 0.0 { i } else { i + 3 })
+        }
+    };
+    bit(0) | bit(1) | bit(2)
+}
+
+/// Whether a surface that faces so can be seen by someone looking along `direction`.
+pub(super) fn is_seen(facing: Facing, direction: DVec3) -> bool {
+    facing & faced(-direction) != 0
+}
