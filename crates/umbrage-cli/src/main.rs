@@ -1,2 +1,71 @@
-//! The program `umbrage`.
-fn main() {}
+//! The program `umbrage`: how wrong is which shadow mapping technique, where, and at what price.
+//!
+//! Two layers: [`args`] parses and checks, all else constructs and runs.
+
+mod args;
+mod compare;
+mod output;
+mod pixels;
+mod plan;
+mod progress;
+mod render;
+mod scenes;
+mod setup;
+mod spec;
+mod values;
+
+use args::Command;
+use clap::error::ErrorKind;
+use std::process::ExitCode;
+
+/// What shells expect where the command line itself is wrong.
+const USAGE_ERROR: u8 = 2;
+
+fn main() -> ExitCode {
+    let (command, verbose) = match args::parse(std::env::args_os()) {
+        Ok(parsed) => parsed,
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            return finish(output::print(&e.render().to_string()));
+        }
+        Err(e) => {
+            output::note(&format!("umbrage: {}", args::one_line(&e)));
+            return ExitCode::from(USAGE_ERROR);
+        }
+    };
+    start_log(verbose);
+    // Log lines would break a progress bar.
+    let quiet = verbose > 0;
+    finish(match &command {
+        Command::Render(args) => render::run(args, quiet),
+        Command::Compare(args) => compare::run(args, quiet),
+        Command::Plan(args) => plan::run(args),
+        Command::Scenes(args) => scenes::run(args),
+    })
+}
+
+fn finish(result: anyhow::Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            // One line, whatever the causes say.
+            let line = format!("{e:#}").split_whitespace().collect::<Vec<_>>().join(" ");
+            output::note(&format!("umbrage: {line}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start_log(verbose: u8) {
+    let level = match verbose {
+        0 => log::LevelFilter::Warn,
+        1 => log::LevelFilter::Info,
+        _ => log::LevelFilter::Debug,
+    };
+    env_logger::Builder::new()
+        .filter_level(level)
+        .format(|out, record| {
+            use std::io::Write;
+            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())
+        })
+        .init();
+}

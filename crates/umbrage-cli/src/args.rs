@@ -1,0 +1,377 @@
+//! The command line: what may be asked for, parsed and checked, before any work begins.
+
+use crate::spec::Technique;
+use crate::values;
+use anyhow::{Result, bail, ensure};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use glam::DVec3;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// How wrong is which shadow mapping technique, where, and at what price, against ray-traced truth.
+///
+/// Without a command it compares five techniques on a built-in scene and writes the folder `report`.
+#[derive(Debug, Parser)]
+#[command(
+    name = "umbrage",
+    version,
+    after_help = "\
+Examples:
+  umbrage
+  umbrage compare town -o report --shadows uniform --shadows lispsm:pcf3@2048
+  umbrage COMMAND --help"
+)]
+pub(crate) struct Cli {
+    /// Log what happens to standard error; twice for more.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub(crate) verbose: u8,
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render one picture with shadows.
+    Render(Render),
+    /// Compare techniques with ray-traced truth, in a report that opens offline.
+    Compare(Compare),
+    /// Print the matrices, resolutions and errors that an engine needs.
+    Plan(Plan),
+    /// List the built-in scenes.
+    Scenes(Scenes),
+}
+
+/// `umbrage render`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage render town -o town.png --shadows lispsm:pcf3@2048
+  umbrage render model.glb -o error.exr --shadows uniform@512 --aov error \\
+      --eye 0,2,5 --target 0,0,0 --sun=-0.5,-1,-0.3")]
+pub(crate) struct Render {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// Picture to write: .png, or .exr for raw floats.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
+    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    pub(crate) shadows: Technique,
+    /// What to write.
+    #[arg(long, value_enum, default_value_t = Aov::Color)]
+    pub(crate) aov: Aov,
+    /// Rays along each side of a pixel: K×K samples.
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) samples: u32,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+}
+
+/// What a rendered picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Aov {
+    /// The shaded scene.
+    Color,
+    /// What the shadow map says: 255 lit, 0 in shadow.
+    Visibility,
+    /// What ray tracing says: 255 lit, 0 in shadow.
+    Truth,
+    /// Where the shadow map is lighter or darker than the truth. EXR: visibility minus truth.
+    Difference,
+    /// Pixels per texel on the surface, in the worst direction.
+    Error,
+    /// Distance along the view. PNG: by its logarithm, the nearest white. EXR: metres.
+    Depth,
+    /// World-space surface normal. PNG: −1 … 1 as 0 … 255.
+    Normal,
+    /// The shadow map's texels as they lie on the surfaces. EXR: texel coordinates s and t.
+    Texels,
+    /// Which map of the plan serves each pixel. EXR: its index, −1 for none.
+    Partition,
+}
+
+/// `umbrage compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage compare town -o report --shadows uniform --shadows psm --shadows adaptive
+  umbrage compare level.glb -o report --shadows lispsm@2048 --shadows tsm:pcf3@2048 \\
+      --eye 0,6,30 --target=-15,0,0 --near 0.25 --far 125 --sun=-0.58,-0.71,-0.41 --json")]
+pub(crate) struct Compare {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// Folder for the report; a former report there is replaced.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048. Once for each technique.
+    #[arg(
+        long, value_name = "SPEC",
+        default_values = DEFAULT_TECHNIQUES
+    )]
+    pub(crate) shadows: Vec<Technique>,
+    /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
+    /// comparisons use 1.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) samples: u32,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+    /// Print report.json to standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `umbrage plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage plan town --shadows adaptive@2048 --json
+  umbrage plan --eye 0,2,0 --target 0,2,-1 --fov 60 --near 0.1 --far 500 --size 1280x720 \\
+      --sun 0.3,-1,0.2 --shadows lispsm@1024 --json")]
+pub(crate) struct Plan {
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them). Without one, the whole
+    /// view between --near and --far is served.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: Option<String>,
+    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
+    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    pub(crate) shadows: Technique,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `umbrage scenes`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage scenes
+  umbrage scenes --json")]
+pub(crate) struct Scenes {
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Which scene.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them), with a size if you
+    /// like: town:200.
+    #[arg(value_name = "SCENE")]
+    pub(crate) name: String,
+    /// Alpha-masked materials cast and show as solid.
+    #[arg(long)]
+    pub(crate) opaque: bool,
+}
+
+/// Who looks on. What is left out comes from the scene.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "View")]
+pub(crate) struct ViewArgs {
+    /// Position of the viewer, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) eye: Option<DVec3>,
+    /// Point in the middle of the picture, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) target: Option<DVec3>,
+    /// Direction that is up in the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    pub(crate) up: Option<DVec3>,
+    /// Vertical field of view, degrees.
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true)]
+    pub(crate) fov: Option<f64>,
+    /// Distance at which the view begins, metres.
+    #[arg(long, value_name = "N", value_parser = values::distance, allow_hyphen_values = true)]
+    pub(crate) near: Option<f64>,
+    /// Distance at which it ends, metres.
+    #[arg(long, value_name = "F", value_parser = values::distance, allow_hyphen_values = true)]
+    pub(crate) far: Option<f64>,
+    /// Size of the picture, pixels.
+    #[arg(
+        long, value_name = "WxH", value_parser = values::picture_size, allow_hyphen_values = true,
+        default_value = "960x540"
+    )]
+    pub(crate) size: [u32; 2],
+    /// A camera of the scene, by name.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "target", "up"])]
+    pub(crate) camera: Option<String>,
+}
+
+/// What shines. Left out: the scene's first light, else a 45° afternoon sun.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct LightArgs {
+    /// Parallel light: the way it travels.
+    #[arg(
+        long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true,
+        conflicts_with = "light"
+    )]
+    pub(crate) sun: Option<DVec3>,
+    /// A light of the scene, by name.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) light: Option<String>,
+}
+
+/// What does the work.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ExecutionArgs {
+    /// What renders the shadow maps.
+    #[arg(long, value_enum, default_value_t = Backend::Auto)]
+    pub(crate) backend: Backend,
+}
+
+/// What renders shadow maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Backend {
+    /// The GPU if there is one, else the reference.
+    Auto,
+    /// A GPU.
+    Gpu,
+    /// Rays on the CPU.
+    Reference,
+}
+
+/// What `compare` compares if not told.
+pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "tsm", "adaptive"];
+
+/// What is done if no command is given.
+const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
+
+/// Parses and checks a command line; its first word is the program's name. Gives the command and how
+/// verbose to be.
+///
+/// Clap's own errors come out, those for `--help` and `--version` among them.
+pub(crate) fn parse(
+    words: impl IntoIterator<Item = OsString>,
+) -> Result<(Command, u8), clap::Error> {
+    let Cli { verbose, command } = Cli::try_parse_from(words)?;
+    let Some(command) = command else {
+        let main_job = MAIN_JOB.map(OsString::from);
+        return parse(main_job).map(|(command, _)| (command, verbose));
+    };
+    let checked = match &command {
+        Command::Render(render) => render.check(),
+        Command::Compare(compare) => compare.check(),
+        Command::Plan(plan) => plan.check(),
+        Command::Scenes(_) => Ok(()),
+    };
+    checked.map_err(|e| clap::Error::raw(clap::error::ErrorKind::ValueValidation, e))?;
+    Ok((command, verbose))
+}
+
+/// Clap's message on one line, without usage and pointers to `--help`.
+pub(crate) fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:"));
+    let words: Vec<&str> =
+        lines.filter(|l| !l.is_empty() && !l.starts_with("For more information")).collect();
+    let line = words.join(" ");
+    line.strip_prefix("error: ").unwrap_or(&line).to_owned()
+}
+
+impl Render {
+    fn check(&self) -> Result<()> {
+        self.view.check()?;
+        self.execution.check()?;
+        self.picture_kind().map(drop)
+    }
+
+    /// Which kind of file to write, by the output's extension.
+    pub(crate) fn picture_kind(&self) -> Result<PictureKind> {
+        let extension = self.output.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("png") => Ok(PictureKind::Png),
+            Some("exr") => Ok(PictureKind::Exr),
+            _ => bail!("--output: {} must end in .png or .exr", self.output.display()),
+        }
+    }
+}
+
+/// A kind of picture file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PictureKind {
+    /// 8-bit colours, for looking at.
+    Png,
+    /// Raw floats.
+    Exr,
+}
+
+impl Compare {
+    fn check(&self) -> Result<()> {
+        self.view.check()?;
+        self.execution.check()?;
+        for (i, technique) in self.shadows.iter().enumerate() {
+            let is_new = !self.shadows[..i].contains(technique);
+            ensure!(is_new, "--shadows: `{}` is given twice", technique.spec);
+        }
+        Ok(())
+    }
+}
+
+impl Plan {
+    fn check(&self) -> Result<()> {
+        self.view.check()?;
+        if self.scene.is_some() {
+            return Ok(());
+        }
+        let view = &self.view;
+        let given = [
+            ("--eye", view.eye.is_some()),
+            ("--target", view.target.is_some()),
+            ("--near", view.near.is_some()),
+            ("--far", view.far.is_some()),
+        ];
+        for (option, is_given) in given {
+            ensure!(is_given, "{option} is needed where no SCENE is given");
+        }
+        for (option, is_given) in
+            [("--camera", view.camera.is_some()), ("--light", self.light.light.is_some())]
+        {
+            ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
+        }
+        Ok(())
+    }
+}
+
+impl ViewArgs {
+    fn check(&self) -> Result<()> {
+        if let (Some(near), Some(far)) = (self.near, self.far) {
+            ensure!(near < far, "--far: must exceed --near ({near}), is {far}");
+        }
+        if let (Some(eye), Some(target)) = (self.eye, self.target) {
+            ensure!(eye != target, "--target: must differ from --eye, both are {eye}");
+        }
+        Ok(())
+    }
+}
+
+impl ExecutionArgs {
+    /// Says which backend `auto` takes.
+    pub(crate) fn announce(&self) {
+        if self.backend == Backend::Auto {
+            crate::output::note("backend: reference, on the CPU (this version has no GPU backend)");
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        ensure!(
+            self.backend != Backend::Gpu,
+            "--backend: gpu is not built into this version yet; take reference or auto"
+        );
+        Ok(())
+    }
+}

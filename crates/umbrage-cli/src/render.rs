@@ -1,0 +1,153 @@
+//! `umbrage render`: one picture.
+
+use crate::args::{self, Aov, PictureKind};
+use crate::output::check_file;
+use crate::pixels::{self, Shadowed, Texels, counted, linear_color, middles};
+use crate::progress::Progress;
+use crate::setup::{lamp, onlooker, open_scene};
+use anyhow::{Context, Result};
+use glam::DVec3;
+use umbrage::Bounds;
+use umbrage_measure::{
+    ErrorScale, Image, Rgb, difference_map, error_map, grey, partition_map, texel_map, write_exr,
+    write_png,
+};
+use umbrage_trace::{Reference, Tracer, View, shade};
+
+/// Everything that pictures are made of; what the picture asked for does not need stays empty.
+#[derive(Default)]
+struct Layers {
+    counted: Vec<bool>,
+    truth: Shadowed,
+    technique: Shadowed,
+    texels: Texels,
+    /// Linear colours.
+    color: Vec<[f32; 3]>,
+    /// Metres; infinite for the sky.
+    depth: Vec<f32>,
+    /// World space; zero for the sky.
+    normal: Vec<DVec3>,
+}
+
+/// Renders, and writes the picture.
+pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
+    let kind = args.picture_kind()?;
+    check_file(&args.output)?;
+    args.execution.announce();
+    let scene = open_scene(&args.scene.name)?;
+    let camera = onlooker(&args.view, Some(&scene))?.camera;
+    let light = lamp(&args.light, Some(&scene))?.light;
+    let tracer = Tracer::new(&scene)?.opaque(args.scene.opaque);
+    let view = View::new(&tracer, camera, light, args.samples).context("--samples")?;
+    let bounds = Bounds::of_scene(scene.bounds());
+    let (plan, _) = pixels::plan(&args.shadows, &camera, &light, &bounds)?;
+
+    let needs_truth = matches!(args.aov, Aov::Truth | Aov::Difference);
+    let needs_map = !matches!(args.aov, Aov::Truth | Aov::Depth | Aov::Normal);
+    let height = u64::from(camera.image()[1]);
+    let filter = args.shadows.filter;
+    let map_rows = if needs_map { Reference::rows(&plan, filter) } else { 0 };
+    let passes = 1 + u64::from(needs_truth) + u64::from(needs_map);
+    let progress = Progress::new(map_rows + height * passes, quiet);
+    let advance = |rows| progress.advance(rows);
+
+    let reference = if needs_map {
+        progress.stage("shadow map");
+        Some(Reference::render(&tracer, &plan, filter, &advance)?)
+    } else {
+        None
+    };
+    progress.stage("picture");
+    let mut layers = Layers::default();
+    for rows in view.bands() {
+        let band = view.band(rows, &advance);
+        layers.counted.extend(counted(&view, &band));
+        for sample in middles(&band) {
+            layers.depth.push(sample.map_or(f32::INFINITY, |s| s.depth as f32));
+            layers.normal.push(sample.map_or(DVec3::ZERO, |s| s.surface.shading_normal));
+        }
+        if needs_truth {
+            let truth = band.map(|s| view.truth(s), &advance);
+            layers.truth.push(&view, &band, &truth);
+        }
+        if let Some(reference) = &reference {
+            let visibility = band.map(|s| reference.visibility(&camera, s), &advance);
+            layers.technique.push(&view, &band, &visibility);
+            layers.texels.push(&view, &band, &plan, reference);
+            if args.aov == Aov::Color && kind == PictureKind::Exr {
+                layers.color.extend(linear_color(&view, &band, &visibility));
+            }
+        }
+    }
+    drop(progress);
+    match kind {
+        PictureKind::Png => layers.write_png(args, &view),
+        PictureKind::Exr => layers.write_exr(args, camera.image()),
+    }
+}
+
+impl Layers {
+    fn write_png(self, args: &args::Render, view: &View<'_>) -> Result<()> {
+        let path = &args.output;
+        let size = view.camera().image();
+        let counted = Image::new(size, self.counted)?;
+        let rgb = |pixels: Vec<Rgb>| Image::new(size, pixels);
+        let gray = |pixels: Vec<f32>| Image::new(size, pixels).map(|i| i.map(|&v| grey(v)));
+        let picture = match args.aov {
+            Aov::Visibility => return Ok(write_png(path, &gray(self.technique.visibility)?)?),
+            Aov::Truth => return Ok(write_png(path, &gray(self.truth.visibility)?)?),
+            Aov::Color => rgb(self.technique.color)?,
+            Aov::Difference => difference_map(
+                &Image::new(size, self.truth.visibility)?,
+                &Image::new(size, self.technique.visibility)?,
+                &counted,
+                &rgb(self.truth.color)?,
+            )?,
+            Aov::Error => error_map(
+                &Image::new(size, self.texels.error)?,
+                &counted,
+                &rgb(self.technique.color)?,
+                ErrorScale::default(),
+            )?,
+            Aov::Texels => {
+                texel_map(&Image::new(size, self.texels.texel)?, &rgb(self.technique.color)?)?
+            }
+            Aov::Partition => {
+                partition_map(&Image::new(size, self.texels.map)?, &rgb(self.technique.color)?)?
+            }
+            Aov::Depth => {
+                let color = |&d: &f32| shade::depth_color(view.camera(), f64::from(d));
+                rgb(self.depth.iter().map(color).collect())?
+            }
+            Aov::Normal => rgb(self.normal.iter().map(|&n| shade::normal_color(n)).collect())?,
+        };
+        Ok(write_png(path, &picture)?)
+    }
+
+    fn write_exr(self, args: &args::Render, size: [u32; 2]) -> Result<()> {
+        let path = &args.output;
+        let plane = |values: Vec<f32>| Ok(write_exr(path, &Image::new(size, values)?)?);
+        let color = |values: Vec<[f32; 3]>| Ok(write_exr(path, &Image::new(size, values)?)?);
+        match args.aov {
+            Aov::Color => color(self.color),
+            Aov::Normal => color(self.normal.iter().map(|n| n.as_vec3().to_array()).collect()),
+            Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
+            Aov::Visibility => plane(self.technique.visibility),
+            Aov::Truth => plane(self.truth.visibility),
+            Aov::Difference => {
+                let pairs = self.technique.visibility.iter().zip(&self.truth.visibility);
+                let differences = pairs.zip(&self.counted);
+                plane(
+                    differences
+                        .map(|((v, t), &counted)| if counted { v - t } else { 0.0 })
+                        .collect(),
+                )
+            }
+            Aov::Error => plane(self.texels.error),
+            Aov::Depth => plane(self.depth),
+            Aov::Partition => {
+                plane(self.texels.map.iter().map(|m| m.map_or(-1.0, f32::from)).collect())
+            }
+        }
+    }
+}
