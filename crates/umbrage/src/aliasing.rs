@@ -70,6 +70,8 @@ pub(crate) struct Local {
     /// Gradients of texel coordinates, 1/m.
     pub grad_s: DVec3,
     pub grad_t: DVec3,
+    /// d row / d t of the map's rows here.
+    pub row_derivative: f64,
 }
 
 impl Local {
@@ -84,12 +86,13 @@ impl Local {
         }
         let t_value = t.dot(h) / h_w;
         let gradient = |row: DVec4, value: f64| (row.xyz() - w.xyz() * value) / h_w;
+        let row_derivative = map.rows.row_derivative(t_value);
         Some(Self {
             w: h_w,
             beam: map.beam_direction(p)?,
             grad_s: gradient(s, s.dot(h) / h_w) * f64::from(map.resolution[0]),
-            grad_t: gradient(t, t_value)
-                * (f64::from(map.resolution[1]) * map.rows.row_derivative(t_value)),
+            grad_t: gradient(t, t_value) * (f64::from(map.resolution[1]) * row_derivative),
+            row_derivative,
         })
     }
 
@@ -146,19 +149,13 @@ impl ShadowMap {
         let (e1, e2) = normal.any_orthonormal_pair();
         let [pixel_x, pixel_y] = camera.pixel_gradients(world_position)?;
         let on_surface = |a: DVec3, b: DVec3| {
-            DMat2::from_cols(
-                DVec2::new(a.dot(e1), b.dot(e1)),
-                DVec2::new(a.dot(e2), b.dot(e2)),
-            )
+            DMat2::from_cols(DVec2::new(a.dot(e1), b.dot(e1)), DVec2::new(a.dot(e2), b.dot(e2)))
         };
         let texels = on_surface(local.grad_s, local.grad_t);
         let pixels = on_surface(pixel_x, pixel_y);
         let det = texels.determinant();
         if det == 0.0 {
-            return Some(SurfaceError {
-                worst: f64::INFINITY,
-                best: 0.0,
-            });
+            return Some(SurfaceError { worst: f64::INFINITY, best: 0.0 });
         }
         // adj(texels)/det instead of an inverse keeps edge-on surfaces at infinity, not NaN.
         let adjugate = DMat2::from_cols(
@@ -169,14 +166,7 @@ impl ShadowMap {
         let (a, b) = (m.x_axis.length_squared(), m.y_axis.length_squared());
         let mixed = m.x_axis.dot(m.y_axis);
         let larger = (a.midpoint(b) + ((a - b) / 2.0).hypot(mixed)).sqrt();
-        let smaller = if larger > 0.0 {
-            m.determinant().abs() / larger
-        } else {
-            0.0
-        };
-        Some(SurfaceError {
-            worst: larger / det.abs(),
-            best: smaller / det.abs(),
-        })
+        let smaller = if larger > 0.0 { m.determinant().abs() / larger } else { 0.0 };
+        Some(SurfaceError { worst: larger / det.abs(), best: smaller / det.abs() })
     }
 }

@@ -12,32 +12,21 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box that holds nothing; the neutral element of [`union`](Self::union).
-    pub const EMPTY: Self = Self {
-        min: DVec3::INFINITY,
-        max: DVec3::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// A box from two opposite corners.
     pub fn new(a: DVec3, b: DVec3) -> Self {
-        Self {
-            min: a.min(b),
-            max: a.max(b),
-        }
+        Self { min: a.min(b), max: a.max(b) }
     }
 
     /// The smallest box around `points`; [`EMPTY`](Self::EMPTY) without any.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points
-            .into_iter()
-            .fold(Self::EMPTY, |b, p| b.union(Self { min: p, max: p }))
+        points.into_iter().fold(Self::EMPTY, |b, p| b.union(Self { min: p, max: p }))
     }
 
     /// The smallest box around both.
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Whether the box holds no point at all.
@@ -69,10 +58,7 @@ impl Aabb {
 
     /// The same box as seen from `origin`.
     pub(crate) fn relative_to(self, origin: DVec3) -> Self {
-        Self {
-            min: self.min - origin,
-            max: self.max - origin,
-        }
+        Self { min: self.min - origin, max: self.max - origin }
     }
 
     pub(crate) fn check(self, field: &'static str) -> Result<(), Error> {
@@ -82,10 +68,7 @@ impl Aabb {
         check_position(self.min, field)?;
         check_position(self.max, field)?;
         check(!self.is_empty(), field, || {
-            format!(
-                "min {} must not exceed max {} (Aabb::EMPTY holds nothing)",
-                self.min, self.max
-            )
+            format!("min {} must not exceed max {} (Aabb::EMPTY holds nothing)", self.min, self.max)
         })
     }
 }
@@ -102,15 +85,11 @@ pub struct Bounds {
 impl Bounds {
     /// One box that holds both receivers and casters.
     pub fn of_scene(scene: Aabb) -> Self {
-        Self {
-            receivers: Some(scene),
-            casters: Some(scene),
-        }
+        Self { receivers: Some(scene), casters: Some(scene) }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.receivers
-            .map_or(Ok(()), |b| b.check("bounds.receivers"))?;
+        self.receivers.map_or(Ok(()), |b| b.check("bounds.receivers"))?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
     }
 }
@@ -127,10 +106,7 @@ pub struct Plane {
 impl Plane {
     /// The half-space through `point` on the side that `normal` (unit) points to.
     pub fn through(point: DVec3, normal: DVec3) -> Self {
-        Self {
-            normal,
-            offset: -normal.dot(point),
-        }
+        Self { normal, offset: -normal.dot(point) }
     }
 
     /// Signed distance of `p`, metres; positive inside.

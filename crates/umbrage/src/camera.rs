@@ -111,12 +111,8 @@ impl Camera {
         const POSE: &str = "camera.world_from_view";
         const PROJECTION: &str = "camera.clip_from_view";
         check_image(image)?;
-        check(world_from_view.is_finite(), POSE, || {
-            "has entries that are not finite".into()
-        })?;
-        check(clip_from_view.is_finite(), PROJECTION, || {
-            "has entries that are not finite".into()
-        })?;
+        check(world_from_view.is_finite(), POSE, || "has entries that are not finite".into())?;
+        check(clip_from_view.is_finite(), PROJECTION, || "has entries that are not finite".into())?;
         let axes = [0, 1, 2].map(|i| world_from_view.col(i).truncate());
         let is_rigid = axes.iter().all(|a| (a.length() - 1.0).abs() < 1e-3)
             && axes[0].dot(axes[1]).abs() < 1e-3
@@ -158,10 +154,7 @@ impl Camera {
             (true, false) => (a, f64::INFINITY),
             (false, true) => (b, f64::INFINITY),
             (false, false) => {
-                return Err(Error::invalid(
-                    PROJECTION,
-                    "has no near plane in front of the viewer",
-                ));
+                return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
             }
         };
         let far = match shadow_distance {
@@ -180,10 +173,7 @@ impl Camera {
             }
         };
         let slope = |ndc: DVec2| {
-            DVec2::new(
-                (ndc.x * scale - x.z * sign) / x.x,
-                (ndc.y * scale - y.z * sign) / y.y,
-            )
+            DVec2::new((ndc.x * scale - x.z * sign) / x.x, (ndc.y * scale - y.z * sign) / y.y)
         };
         let forward = (axes[2] * sign).normalize();
         // In a left-handed view space the x axis still points right in the picture.
@@ -207,21 +197,12 @@ impl Camera {
     }
 
     fn checked(self) -> Result<Self, Error> {
-        check(
-            self.near > 0.0 && self.near.is_finite(),
-            "camera.near",
-            || format!("must be positive and finite, is {}", self.near),
-        )?;
-        check(
-            self.far > self.near && self.far <= 1e12,
-            "camera.far",
-            || {
-                format!(
-                    "must exceed camera.near ({}) and be at most 1e12, is {}",
-                    self.near, self.far
-                )
-            },
-        )?;
+        check(self.near > 0.0 && self.near.is_finite(), "camera.near", || {
+            format!("must be positive and finite, is {}", self.near)
+        })?;
+        check(self.far > self.near && self.far <= 1e12, "camera.far", || {
+            format!("must exceed camera.near ({}) and be at most 1e12, is {}", self.near, self.far)
+        })?;
         let span = self.slope_max - self.slope_min;
         check(
             span.min_element() > 1e-9
@@ -313,10 +294,7 @@ impl Camera {
         (z > 0.0).then(|| {
             let slope = DVec2::new(self.right.dot(v), self.up.dot(v)) / z;
             let unit = (slope - self.slope_min) / (self.slope_max - self.slope_min);
-            DVec2::new(
-                unit.x * f64::from(self.image[0]),
-                (1.0 - unit.y) * f64::from(self.image[1]),
-            )
+            DVec2::new(unit.x * f64::from(self.image[0]), (1.0 - unit.y) * f64::from(self.image[1]))
         })
     }
 
@@ -329,10 +307,7 @@ impl Camera {
         let [width, height] = self.image.map(f64::from);
         let gradient = |axis: DVec3| (axis - self.forward * (axis.dot(v) / z)) / z;
         (z > 0.0).then(|| {
-            [
-                gradient(self.right) * (width / span.x),
-                gradient(self.up) * (-height / span.y),
-            ]
+            [gradient(self.right) * (width / span.x), gradient(self.up) * (-height / span.y)]
         })
     }
 
@@ -346,14 +321,7 @@ impl Camera {
 }
 
 fn check_image(image: [u32; 2]) -> Result<(), Error> {
-    check(
-        image.iter().all(|&n| (1..=65536).contains(&n)),
-        "camera.image",
-        || {
-            format!(
-                "must be 1 to 65536 pixels each way, is {}x{}",
-                image[0], image[1]
-            )
-        },
-    )
+    check(image.iter().all(|&n| (1..=65536).contains(&n)), "camera.image", || {
+        format!("must be 1 to 65536 pixels each way, is {}x{}", image[0], image[1])
+    })
 }

@@ -16,10 +16,7 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn invalid(field: &'static str, problem: impl Into<Cow<'static, str>>) -> Self {
-        Self::Invalid {
-            field,
-            problem: problem.into(),
-        }
+        Self::Invalid { field, problem: problem.into() }
     }
 }
 
@@ -29,21 +26,15 @@ pub(crate) fn check(
     field: &'static str,
     problem: impl FnOnce() -> String,
 ) -> Result<(), Error> {
-    if ok {
-        Ok(())
-    } else {
-        Err(Error::invalid(field, problem()))
-    }
+    if ok { Ok(()) } else { Err(Error::invalid(field, problem())) }
 }
 
 /// Checks that every coordinate is finite and so small that squares and products of a few of them
 /// stay finite: the world's coordinates end at 10¹² metres.
 pub(crate) fn check_position(v: glam::DVec3, field: &'static str) -> Result<(), Error> {
-    check(
-        v.is_finite() && v.abs().max_element() <= 1e12,
-        field,
-        || format!("must be finite and within 1e12 metres of the origin, is {v}"),
-    )
+    check(v.is_finite() && v.abs().max_element() <= 1e12, field, || {
+        format!("must be finite and within 1e12 metres of the origin, is {v}")
+    })
 }
 
 /// The unit vector along `v`, or an error naming `field`.

@@ -45,14 +45,8 @@ impl ConvexBody {
         self.vertices.extend(camera.corners_at(camera.near()));
         self.vertices.extend(camera.corners_at(camera.far()));
         // Near corners are 0–3, far ones 4–7: lower left, lower right, upper right, upper left.
-        let faces = [
-            [0, 1, 2, 3],
-            [5, 4, 7, 6],
-            [1, 0, 4, 5],
-            [2, 1, 5, 6],
-            [3, 2, 6, 7],
-            [0, 3, 7, 4],
-        ];
+        let faces =
+            [[0, 1, 2, 3], [5, 4, 7, 6], [1, 0, 4, 5], [2, 1, 5, 6], [3, 2, 6, 7], [0, 3, 7, 4]];
         for (i, face) in faces.into_iter().enumerate() {
             let [a, b, c] = [face[0], face[1], face[2]].map(|i: u32| self.vertices[i as usize]);
             let normal = (c - b).cross(b - a).normalize();
@@ -69,11 +63,7 @@ impl ConvexBody {
     }
 
     fn push_face(&mut self, plane: Plane, indices: &[u32]) {
-        self.faces.push(Face {
-            plane,
-            start: self.loops.len(),
-            len: indices.len(),
-        });
+        self.faces.push(Face { plane, start: self.loops.len(), len: indices.len() });
         self.loops.extend_from_slice(indices);
     }
 
@@ -124,41 +114,20 @@ impl ConvexBody {
         }
         // A flat box, a ground plane say, gets a thickness far below what single precision
         // resolves, so that the body keeps an inside.
-        let pad = 1e-7
-            * self
-                .vertices
-                .iter()
-                .fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        let pad = 1e-7 * self.vertices.iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            self.clip(Plane {
-                normal: axis,
-                offset: pad - axis.dot(aabb.min),
-            });
-            self.clip(Plane {
-                normal: -axis,
-                offset: pad + axis.dot(aabb.max),
-            });
+            self.clip(Plane { normal: axis, offset: pad - axis.dot(aabb.min) });
+            self.clip(Plane { normal: -axis, offset: pad + axis.dot(aabb.max) });
         }
     }
 
     /// Cuts off what lies outside `plane`.
     pub(crate) fn clip(&mut self, plane: Plane) {
-        let scale = self
-            .vertices
-            .iter()
-            .fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        let scale = self.vertices.iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
         // Vertices this close to the plane count as on it: no slivers below rounding.
         let tolerance = 1e-13 * scale.max(plane.offset.abs());
-        let Scratch {
-            distances,
-            moved,
-            cuts,
-            rim,
-            on_plane,
-            vertices,
-            faces,
-            loops,
-        } = &mut self.scratch;
+        let Scratch { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
+            &mut self.scratch;
         distances.clear();
         distances.extend(self.vertices.iter().map(|&v| {
             let d = plane.distance(v);
@@ -215,11 +184,7 @@ impl ConvexBody {
                 loops.truncate(start);
                 continue;
             }
-            faces.push(Face {
-                plane: face.plane,
-                start,
-                len,
-            });
+            faces.push(Face { plane: face.plane, start, len });
             for i in start..start + len {
                 let (a, b) = (loops[i], loops[start + (i + 1 - start) % len]);
                 if on_plane[a as usize] && on_plane[b as usize] {
@@ -247,5 +212,111 @@ impl ConvexBody {
         std::mem::swap(&mut self.vertices, vertices);
         std::mem::swap(&mut self.faces, faces);
         std::mem::swap(&mut self.loops, loops);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::LookAt;
+    use proptest::prelude::*;
+
+    fn camera() -> Camera {
+        Camera::look_at(LookAt {
+            eye: DVec3::ZERO,
+            target: DVec3::new(1.0, -0.3, -2.0),
+            up: DVec3::Y,
+            fov_y_rad: 1.0,
+            near: 0.1,
+            far: 20.0,
+            image: [640, 480],
+        })
+        .unwrap()
+    }
+
+    fn plane() -> impl Strategy<Value = Plane> {
+        ([-1.0..1.0f64, -1.0..1.0, -1.0..1.0], 0.0..12.0f64).prop_filter_map(
+            "a direction",
+            |(n, offset)| {
+                let normal = DVec3::from(n).try_normalize()?;
+                Some(Plane { normal, offset })
+            },
+        )
+    }
+
+    /// All intersections of three planes that lie inside the others.
+    fn corners(planes: &[Plane]) -> Vec<DVec3> {
+        let mut corners = Vec::new();
+        for (i, a) in planes.iter().enumerate() {
+            for (j, b) in planes[..i].iter().enumerate() {
+                for c in &planes[..j] {
+                    let det = a.normal.dot(b.normal.cross(c.normal));
+                    let p = -(b.normal.cross(c.normal) * a.offset
+                        + c.normal.cross(a.normal) * b.offset
+                        + a.normal.cross(b.normal) * c.offset)
+                        / det;
+                    if det.abs() > 1e-6 && planes.iter().all(|q| q.distance(p) > -1e-9) {
+                        corners.push(p);
+                    }
+                }
+            }
+        }
+        corners
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Clipping finds all corners that brute force finds, and no others; faces close up: every edge
+        /// belongs to two of them (Euler: V − E + F = 2).
+        #[test]
+        fn clipping_agrees_with_brute_force(
+            cuts in proptest::collection::vec(plane(), 0..8),
+            floor in proptest::option::of(-2.0..2.0f64),
+        ) {
+            let mut body = ConvexBody::default();
+            body.set_frustum(&camera());
+            let mut planes: Vec<Plane> = body.planes().collect();
+            // Sometimes all that is left is a floor of hardly any thickness.
+            let slab = floor.map(|y| [(DVec3::Y, 1e-6 - y), (DVec3::NEG_Y, 1e-6 + y)]);
+            let slab = slab.into_iter().flatten().map(|(normal, offset)| Plane { normal, offset });
+            for cut in slab.chain(cuts) {
+                body.clip(cut);
+                planes.push(cut);
+            }
+            let expected = corners(&planes);
+            for p in &expected {
+                let nearest = body.vertices().iter().map(|v| v.distance(*p)).fold(f64::INFINITY, f64::min);
+                prop_assert!(nearest < 1e-7, "{p} is missing by {nearest}");
+            }
+            for v in body.vertices() {
+                prop_assert!(planes.iter().all(|q| q.distance(*v) > -1e-9));
+            }
+            if !body.is_empty() {
+                let (v, e, f) = (body.vertices().len(), body.edges().count(), body.planes().count());
+                prop_assert_eq!(v + f, e + 2);
+                prop_assert_eq!(body.triangles().count(), 2 * v - 4);
+            }
+        }
+    }
+
+    #[test]
+    fn a_flat_box_keeps_its_floor() {
+        let mut body = ConvexBody::default();
+        body.set_frustum(&camera());
+        body.clip_aabb(Aabb::new(DVec3::new(-50.0, -1.0, -50.0), DVec3::new(50.0, -1.0, 50.0)));
+        assert!(body.vertices().len() >= 6);
+        assert!(body.vertices().iter().all(|v| (v.y + 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_box_out_of_sight_leaves_nothing() {
+        let mut body = ConvexBody::default();
+        for aabb in [Aabb::new(DVec3::splat(30.0), DVec3::splat(31.0)), Aabb::EMPTY] {
+            body.set_frustum(&camera());
+            body.clip_aabb(aabb);
+            assert!(body.is_empty());
+            assert_eq!(body.edges().count() + body.triangles().count(), 0);
+        }
     }
 }

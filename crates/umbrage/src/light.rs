@@ -39,11 +39,7 @@ impl SpotLight {
         let slope = self.half_angle_rad.tan();
         std::array::from_fn(|i| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
-            let depth = if i >> 2 & 1 == 1 {
-                self.range
-            } else {
-                self.near
-            };
+            let depth = if i >> 2 & 1 == 1 { self.range } else { self.near };
             apex + (self.direction + a * sign(0) + b * sign(1)) * depth
         })
     }
@@ -83,37 +79,26 @@ impl Light {
     /// The same light with unit directions, or what is wrong with it.
     pub(crate) fn checked(&self) -> Result<Self, Error> {
         match *self {
-            Self::Directional { direction } => Ok(Self::Directional {
-                direction: unit(direction, "light.direction")?,
-            }),
+            Self::Directional { direction } => {
+                Ok(Self::Directional { direction: unit(direction, "light.direction")? })
+            }
             Self::Spot(spot) => {
                 check_position(spot.position, "light.position")?;
                 let max = 85f64.to_radians();
                 check(
                     spot.half_angle_rad > 0.0 && spot.half_angle_rad <= max,
                     "light.half_angle_rad",
-                    || {
-                        format!(
-                            "must lie in (0, {max:.4}] (85°), is {}",
-                            spot.half_angle_rad
-                        )
-                    },
+                    || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
                 )?;
-                check(
-                    spot.near > 0.0 && spot.near.is_finite(),
-                    "light.near",
-                    || format!("must be positive and finite, is {}", spot.near),
-                )?;
-                check(
-                    spot.range > spot.near && spot.range <= 1e12,
-                    "light.range",
-                    || {
-                        format!(
-                            "must exceed light.near ({}) and be at most 1e12, is {}",
-                            spot.near, spot.range
-                        )
-                    },
-                )?;
+                check(spot.near > 0.0 && spot.near.is_finite(), "light.near", || {
+                    format!("must be positive and finite, is {}", spot.near)
+                })?;
+                check(spot.range > spot.near && spot.range <= 1e12, "light.range", || {
+                    format!(
+                        "must exceed light.near ({}) and be at most 1e12, is {}",
+                        spot.near, spot.range
+                    )
+                })?;
                 Ok(Self::Spot(SpotLight {
                     direction: unit(spot.direction, "light.direction")?,
                     ..spot

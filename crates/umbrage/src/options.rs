@@ -81,11 +81,9 @@ pub enum Size {
 
 impl Options {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        check(
-            (1..=65536).contains(&self.max_side),
-            "options.max_side",
-            || format!("must be 1 to 65536 texels, is {}", self.max_side),
-        )?;
+        check((1..=65536).contains(&self.max_side), "options.max_side", || {
+            format!("must be 1 to 65536 texels, is {}", self.max_side)
+        })?;
         match self.size {
             Size::Budget(texels) => {
                 check((1..=1 << 32).contains(&texels), "options.size", || {
@@ -109,11 +107,11 @@ impl Options {
             Warp::Lambda(lambda) => check(lambda > 0.0, "options.warp.lambda", || {
                 format!("must be a positive distance, is {lambda}")
             }),
-            Warp::Tsm { focus: Some(focus) } => check(
-                focus > 0.0 && focus.is_finite(),
-                "options.warp.focus",
-                || format!("must be a positive, finite distance, is {focus}"),
-            ),
+            Warp::Tsm { focus: Some(focus) } => {
+                check(focus > 0.0 && focus.is_finite(), "options.warp.focus", || {
+                    format!("must be a positive, finite distance, is {focus}")
+                })
+            }
             _ => Ok(()),
         }
     }

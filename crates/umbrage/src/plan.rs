@@ -1,6 +1,6 @@
 use crate::bounds::{Aabb, Plane};
 use crate::camera::Camera;
-use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4Swizzles};
+use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
 
 /// What to render and how to look it up: the result of planning.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -167,20 +167,12 @@ impl ShadowMap {
     /// The beam through (s, t). Slightly outside [0, 1]² is fine; `None` where no point has these
     /// coordinates (beyond the warp's horizon).
     pub fn beam(&self, st: DVec2) -> Option<Beam> {
-        let at = |depth: f64| {
-            let h = self.local_from_shadow * DVec4::new(st.x, st.y, depth, 1.0);
-            (h.w > 0.0).then(|| h.xyz() / h.w)
-        };
-        let [near, far] = [at(0.0)?, at(1.0)?];
-        let (direction, reach_back) = match self.apex {
-            None => ((far - near).try_normalize()?, f64::INFINITY),
-            Some(apex) => ((near - apex).try_normalize()?, near.distance(apex)),
-        };
-        Some(Beam {
-            origin: near + self.origin,
-            direction,
-            reach_back,
-        })
+        // Depth 0 exists on every beam; a spot light's may reach infinity before depth 1.
+        let h = self.local_from_shadow * st.extend(0.0).extend(1.0);
+        let near = (h.w > 0.0).then(|| h.xyz() / h.w)?;
+        let direction = self.beam_direction(near)?;
+        let reach_back = self.apex.map_or(f64::INFINITY, |apex| near.distance(apex));
+        Some(Beam { origin: near + self.origin, direction, reach_back })
     }
 
     /// A surface point with its plane, as the map sees it. `world_normal` need not have unit length
@@ -195,11 +187,7 @@ impl ShadowMap {
         Some(Receiver {
             st: p.truncate(),
             depth: p.z,
-            slope: if slope.is_finite() {
-                slope
-            } else {
-                DVec2::INFINITY
-            },
+            slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
         })
     }
 

@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::error::Error;
 use crate::focus::ConvexBody;
 use crate::light::Light;
-use crate::options::{Options, Warp};
+use crate::options::{Objective, Options, Warp};
 use crate::plan::{MapError, Plan, Rows, ShadowMap};
 use crate::resolution::resolution;
 use crate::warp::{LightSpace, OnePoint, Seen, psm};
@@ -59,11 +59,7 @@ impl Planner {
             _ => space.theta_rad,
         };
         self.plan.origin = camera.eye();
-        self.plan.theta_rad = if theta_rad.is_finite() {
-            theta_rad
-        } else {
-            0.0
-        };
+        self.plan.theta_rad = if theta_rad.is_finite() { theta_rad } else { 0.0 };
         self.plan.maps.resize_with(1, || ShadowMap::empty(camera));
         let mut map = self.plan.maps.swap_remove(0);
         self.plan_map(&mut map, camera, &space, &light, bounds, options);
@@ -97,27 +93,22 @@ impl Planner {
         }
         let seen = &mut self.seen;
         seen.clear();
-        seen.extend(
-            self.body
-                .vertices()
-                .iter()
-                .map(|&v| Seen::new(v, space, camera)),
-        );
-        caster_planes(
-            &mut map.caster_planes,
-            &self.body,
-            seen,
-            space,
-            &mut self.outline,
-        );
+        seen.extend(self.body.vertices().iter().map(|&v| Seen::new(v, space, camera)));
+        caster_planes(&mut map.caster_planes, &self.body, seen, space, &mut self.outline);
+        if space.apex.is_some() {
+            // Under a spot light errors need not be largest at corners. These are points enough to
+            // choose a warp by; the errors reported do not depend on them.
+            let vertices = self.body.vertices();
+            seen.extend(self.body.edges().flat_map(|[a, b]| {
+                [0.25, 0.5, 0.75].map(|k| Seen::new(vertices[a].lerp(vertices[b], k), space, camera))
+            }));
+        }
 
         // What the map has to cover is what is seen, but for `unfocused`.
         let covered: &[Seen] = if options.warp == Warp::Unfocused {
             self.covered.clear();
             let cover = |p: DVec3| Seen::new(p, space, camera);
-            let scene = bounds
-                .receivers
-                .map(|r| bounds.casters.map_or(r, |c| r.union(c)));
+            let scene = bounds.receivers.map(|r| bounds.casters.map_or(r, |c| r.union(c)));
             self.covered.extend(match (light, scene) {
                 (Light::Spot(spot), _) => spot.corners(camera.eye()).map(cover),
                 (_, Some(scene)) => scene.relative_to(camera.eye()).corners().map(cover),
@@ -133,28 +124,38 @@ impl Planner {
             Warp::Psm => psm(space, camera, self.body.vertices()),
             _ => None,
         };
-        let homography = match unfitted {
-            Some(unfitted) => fit(unfitted, covered),
-            None => {
-                let nu = family.strength(options.warp, covered, space, camera);
-                if options.warp == Warp::Log && nu > 1e-9 {
-                    map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
-                }
-                family.homography(nu, covered)
-            }
+        let mut finish = |map: &mut ShadowMap, homography: DMat3| {
+            [map.shadow_from_local, map.local_from_shadow] = matrices(homography, covered, space);
+            map.apex = space.apex;
+            map.lambda = lambda(homography, &self.seen);
+            map.split = depth_range(&self.seen);
+            // Errors at one texel decide the resolution.
+            map.resolution = [1, 1];
+            let [unit_s, unit_t] = unit_errors(map, &self.body, camera);
+            map.resolution = resolution(options, unit_s, unit_t);
+            map.error = worst_errors(map, &self.body, camera, &mut self.worst);
+            let height = f64::from(camera.image()[1]);
+            map.storage_factor =
+                map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
         };
-        map.set_matrix(matrix(homography, covered, space), space);
-        map.lambda = lambda(homography, &self.seen);
-        map.split = depth_range(&self.seen);
-
-        // Errors at one texel and one pixel decide the resolution.
-        map.resolution = [1, 1];
-        let [unit_s, unit_t] = unit_errors(map, &self.body, camera);
-        map.resolution = resolution(options, unit_s, unit_t);
-        map.error = worst_errors(map, &self.body, camera, &mut self.worst);
-        let height = f64::from(camera.image()[1]);
-        map.storage_factor =
-            map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
+        if let Some(unfitted) = unfitted {
+            finish(map, fit(unfitted, covered));
+            return;
+        }
+        let nu = family.strength(options.warp, covered, space, camera);
+        if options.warp == Warp::Log && nu > 1e-9 {
+            map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
+        }
+        finish(map, family.homography(nu, covered));
+        // Under a spot light `adaptive` has chosen by samples. The promise not to be worse than
+        // `uniform` is kept by looking.
+        if options.warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0 {
+            let adapted = map.storage_factor;
+            finish(map, family.homography(0.0, covered));
+            if adapted < map.storage_factor {
+                finish(map, family.homography(nu, covered));
+            }
+        }
     }
 }
 
@@ -179,16 +180,7 @@ impl ShadowMap {
     fn clear(&mut self, camera: &Camera) {
         let mut caster_planes = std::mem::take(&mut self.caster_planes);
         caster_planes.clear();
-        *self = Self {
-            caster_planes,
-            ..Self::empty(camera)
-        };
-    }
-
-    fn set_matrix(&mut self, shadow_from_local: DMat4, space: &LightSpace) {
-        self.shadow_from_local = shadow_from_local;
-        self.local_from_shadow = shadow_from_local.inverse();
-        self.apex = space.apex;
+        *self = Self { caster_planes, ..Self::empty(camera) };
     }
 }
 
@@ -197,17 +189,13 @@ impl ShadowMap {
 fn fit(homography: DMat3, seen: &[Seen]) -> DMat3 {
     let [s, t, w] = [0, 1, 2].map(|i| homography.row(i));
     let range = |row: DVec3| {
-        seen.iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-                let h = p.xz.extend(1.0);
-                let v = row.dot(h) / w.dot(h);
-                (lo.min(v), hi.max(v))
-            })
+        seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+            let h = p.xz.extend(1.0);
+            let v = row.dot(h) / w.dot(h);
+            (lo.min(v), hi.max(v))
+        })
     };
-    let least_w = seen
-        .iter()
-        .map(|p| w.dot(p.xz.extend(1.0)))
-        .fold(f64::INFINITY, f64::min);
+    let least_w = seen.iter().map(|p| w.dot(p.xz.extend(1.0))).fold(f64::INFINITY, f64::min);
     let fit = |row: DVec3| {
         let (lo, hi) = range(row);
         (row - w * lo) / ((hi - lo).max(1e-12 * hi.abs().max(lo.abs())) * least_w)
@@ -216,16 +204,15 @@ fn fit(homography: DMat3, seen: &[Seen]) -> DMat3 {
 }
 
 /// The whole transform from local to shadow space: the homography for s, t and w, and a depth that
-/// grows linearly away from the light, divided by w, with 0 and 1 at the ends of what is covered.
-fn matrix(homography: DMat3, covered: &[Seen], space: &LightSpace) -> DMat4 {
+/// grows linearly away from the light, divided by w, with 0 and 1 at the ends of what is covered. And
+/// its inverse.
+fn matrices(homography: DMat3, covered: &[Seen], space: &LightSpace) -> [DMat4; 2] {
     let w = homography.row(2);
     let range = |f: &dyn Fn(&Seen) -> f64| {
         covered
             .iter()
             .map(f)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
-                (lo.min(v), hi.max(v))
-            })
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
     };
     let (y0, y1) = range(&|p| p.y);
     // y counts from the middle of its range (Wimmer et al. 2004, §3.4), which keeps the perspective from
@@ -240,24 +227,25 @@ fn matrix(homography: DMat3, covered: &[Seen], space: &LightSpace) -> DMat4 {
     let nearest = nearest.midpoint(farthest) - span / 2.0;
     // Numerators over (x, y, z, w) of light space.
     let on_plane = |row: DVec3| DVec4::new(row.x, 0.0, row.y, row.z);
-    let w_row = on_plane(w);
-    let depth_row = (DVec4::new(0.0, -1.0, 0.0, middle) - w_row * nearest) / span;
-    let shadow_from_light = DMat4::from_cols(
-        on_plane(homography.row(0)),
-        on_plane(homography.row(1)),
-        depth_row,
-        w_row,
-    )
-    .transpose();
-    shadow_from_light * space.light_from_local()
+    let rows = [0, 1, 2].map(|i| on_plane(homography.row(i)));
+    let depth_row = (DVec4::new(0.0, -1.0, 0.0, middle) - rows[2] * nearest) / span;
+    let shadow_from_light = DMat4::from_cols(rows[0], rows[1], depth_row, rows[2]).transpose();
+    // Inverted piece by piece, which keeps the digits that a general inverse loses where near and far
+    // are orders of magnitude apart: y follows from depth and the rest.
+    let inverse = homography.inverse();
+    let [x, z, w] = [0, 1, 2].map(|i| inverse.row(i)).map(|r| DVec4::new(r.x, r.y, 0.0, r.z));
+    let y = w * middle - DVec4::new(0.0, 0.0, span, nearest);
+    let light_from_shadow = DMat4::from_cols(x, y, z, w).transpose();
+    [
+        shadow_from_light * space.light_from_local(),
+        space.local_from_light() * light_from_shadow,
+    ]
 }
 
 fn light_plane_extent(covered: &[Seen]) -> f64 {
     let (lo, hi) = covered
         .iter()
-        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| {
-            (lo.min(p.xz), hi.max(p.xz))
-        });
+        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| (lo.min(p.xz), hi.max(p.xz)));
     (hi - lo).max_element()
 }
 
@@ -273,34 +261,27 @@ fn depth_unit(covered: &[Seen], space: &LightSpace) -> f64 {
 /// does not vary.
 fn lambda(homography: DMat3, seen: &[Seen]) -> Option<f64> {
     let w = homography.row(2);
-    let (lo, hi) = seen
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-            let v = w.dot(p.xz.extend(1.0));
-            (lo.min(v), hi.max(v))
-        });
+    let (lo, hi) = seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+        let v = w.dot(p.xz.extend(1.0));
+        (lo.min(v), hi.max(v))
+    });
     (hi > lo * (1.0 + 1e-9)).then(|| lo / w.truncate().length())
 }
 
 fn depth_range(seen: &[Seen]) -> [f64; 2] {
     seen.iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| {
-            [lo.min(p.depth), hi.max(p.depth)]
-        })
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| [lo.min(p.depth), hi.max(p.depth)])
 }
 
 /// Largest m_s and m_t of a map at the body's vertices.
 fn unit_errors(map: &ShadowMap, body: &ConvexBody, camera: &Camera) -> [f64; 2] {
-    body.vertices()
-        .iter()
-        .filter_map(|&v| Some((v, Local::at(map, v)?.footprint())))
-        .fold([0.0f64; 2], |[s, t], (v, footprint)| {
+    body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
+        [0.0f64; 2],
+        |[s, t], (v, footprint)| {
             let depth = camera.forward().dot(v);
-            [
-                s.max(footprint.base() / depth),
-                t.max(footprint.height() / depth),
-            ]
-        })
+            [s.max(footprint.base() / depth), t.max(footprint.height() / depth)]
+        },
+    )
 }
 
 /// The corners of a cube around the view frustum's bounding sphere, aligned with light space.
@@ -312,11 +293,7 @@ fn bounding_cube(camera: &Camera, space: &LightSpace) -> [DVec3; 8] {
     let along = (far[0] - near[0]).dot(axis) * 2.0;
     let depth = ((f2 - n2) / along).min(camera.far());
     let center = axis * depth;
-    let radius = near
-        .iter()
-        .chain(&far)
-        .map(|c| c.distance(center))
-        .fold(0.0, f64::max);
+    let radius = near.iter().chain(&far).map(|c| c.distance(center)).fold(0.0, f64::max);
     let axes = [space.x, space.y, space.z].map(|row| row.truncate() * radius);
     std::array::from_fn(|i| {
         let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -334,20 +311,14 @@ fn caster_planes(
     space: &LightSpace,
     outline: &mut Vec<DVec2>,
 ) {
-    let size = body
-        .vertices()
-        .iter()
-        .fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+    let size = body.vertices().iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
     // Rounding must never lose a caster.
     let slack = 1e-9 * size;
     let sweeps_inwards = |plane: &Plane| match space.apex {
         None => plane.normal.dot(space.y.truncate()) >= 0.0,
         Some(apex) => plane.distance(apex) >= 0.0,
     };
-    let widen = |p: Plane| Plane {
-        offset: p.offset + slack,
-        ..p
-    };
+    let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
     planes.extend(body.planes().filter(sweeps_inwards).map(widen));
     convex_outline(outline, seen.iter().map(|p| p.xz));
     for (i, &a) in outline.iter().enumerate() {
@@ -359,10 +330,11 @@ fn caster_planes(
         let length = plane.truncate().length();
         if length > 0.0 {
             let plane = plane / length;
-            planes.push(widen(Plane {
-                normal: plane.truncate(),
-                offset: plane.w,
-            }));
+            let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
+            // An edge as short as rounding may point anywhere: better no plane than a wrong one.
+            if body.vertices().iter().all(|&v| plane.distance(v) >= 0.0) {
+                planes.push(plane);
+            }
         }
     }
 }

@@ -14,9 +14,6 @@ pub(crate) fn resolution(options: &Options, unit_s: f64, unit_t: f64) -> [u32; 2
     let s = (budget * ratio).sqrt().clamp(1.0, max);
     // Rounding s first and giving t what is left keeps within the budget and wastes the least.
     let t = (budget / s.round()).floor().clamp(1.0, max);
-    let s = (budget / t)
-        .floor()
-        .clamp(1.0, max)
-        .min(if t == max { max } else { s.round() });
+    let s = (budget / t).floor().clamp(1.0, max).min(if t == max { max } else { s.round() });
     [s as u32, t as u32]
 }

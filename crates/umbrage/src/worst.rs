@@ -16,7 +16,7 @@
 use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::ConvexBody;
-use crate::plan::{MapError, Rows, ShadowMap};
+use crate::plan::{MapError, ShadowMap};
 use glam::DVec3;
 
 /// The reported maximum may exceed the true one by this share.
@@ -34,8 +34,10 @@ struct Corner {
     r: f64,
     w: f64,
     z: f64,
-    /// Along whose direction `height` is measured: w²/height = m_t.
+    /// Direction in which a texel's height is measured, of any length.
     normal_t: DVec3,
+    /// Share by which logarithmic rows shrink texels in t here; 1 for even rows.
+    row_scale: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -65,18 +67,13 @@ pub(crate) fn worst_errors(
     let Scratch { corners, stack } = scratch;
     corners.clear();
     corners.extend(body.vertices().iter().filter_map(|&v| search.corner(v)));
-    let mut best = corners
-        .iter()
-        .fold([0f64; 3], |best, c| larger(best, c.errors));
-    // A corner that the map does not reach would be a fault of the fit; and logarithmic rows take
-    // one w out of B's second column, which leaves the largest error at a corner.
-    if corners.len() == body.vertices().len() && map.rows == Rows::Even {
+    let mut best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
+    // A corner that the map does not reach would be a fault of the fit.
+    debug_assert_eq!(corners.len(), body.vertices().len());
+    if corners.len() == body.vertices().len() {
         stack.clear();
-        let simplex = |i: [usize; 3], is_edge| Simplex {
-            corners: i.map(|i| corners[i]),
-            is_edge,
-            depth: 0,
-        };
+        let simplex =
+            |i: [usize; 3], is_edge| Simplex { corners: i.map(|i| corners[i]), is_edge, depth: 0 };
         if search.edges_suffice() {
             stack.extend(body.edges().map(|[a, b]| simplex([a, b, b], true)));
         } else {
@@ -113,7 +110,8 @@ impl Search<'_> {
             r: self.map.apex.map_or(1.0, |apex| p.distance(apex)),
             w: local.w,
             z,
-            normal_t: local.grad_t * (local.w * local.w),
+            normal_t: local.grad_t * local.w,
+            row_scale: local.row_derivative.recip(),
         })
     }
 
@@ -130,7 +128,11 @@ impl Search<'_> {
         bounds: &mut [f64; 3],
         stack: &mut Vec<Simplex>,
     ) {
-        let bound = self.bound(simplex);
+        let mut bound = self.bound(simplex);
+        if simplex.is_edge {
+            // B's first column is constant and w²/z convex: corners have the largest m_s and m_t.
+            [bound[0], bound[1]] = [best[0], best[1]];
+        }
         let is_open = |i: usize| bound[i] > best[i] * (1.0 + TOLERANCE);
         if !(0..3).any(is_open) || simplex.depth >= MAX_DEPTH {
             for i in 0..3 {
@@ -146,9 +148,8 @@ impl Search<'_> {
         let (u, v, rest) = if simplex.is_edge {
             sides[0]
         } else {
-            let longest = sides
-                .iter()
-                .max_by(|p, q| length(&p.0, &p.1).total_cmp(&length(&q.0, &q.1)));
+            let longest =
+                sides.iter().max_by(|p, q| length(&p.0, &p.1).total_cmp(&length(&q.0, &q.1)));
             longest.copied().unwrap_or(sides[0])
         };
         // The point halfway in 1/z keeps the two halves' ranges of z alike.
@@ -170,22 +171,17 @@ impl Search<'_> {
         let corners = &simplex.corners;
         let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
         let w_over_z = max(&|c| c.w / c.z);
-        // m_t = w²/|w² ∇t|, and w² ∇t is affine: its length is at least its share along any
-        // fixed direction.
-        let normal = corners
-            .iter()
-            .map(|c| c.normal_t)
-            .sum::<DVec3>()
-            .normalize_or_zero();
+        // m_t = w²/|N| with N = w² ∇t affine, whose length is at least its share along any fixed
+        // direction: the ratio of w to that share is again largest at a corner. (With logarithmic
+        // rows the ratio has light space's own w on top.)
+        let normal = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
         let t = w_over_z
             * max(&|c| {
-                let share = c.normal_t.dot(normal);
-                if share > 0.0 {
-                    c.w / share
-                } else {
-                    f64::INFINITY
-                }
+                let cos = c.normal_t.dot(normal) / c.normal_t.length();
+                if cos > 0.0 { c.errors[1] * c.z / c.w / cos } else { f64::INFINITY }
             });
+        // Logarithmic rows scale B's second column, by at most this much differently within the simplex.
+        let spread = max(&|c| c.row_scale) * max(&|c| c.row_scale.recip());
         let norm = |i: usize| match self.map.apex {
             None => {
                 let affine = max(&|c| c.errors[i] * c.z / c.w);
@@ -193,22 +189,14 @@ impl Search<'_> {
                 (w_over_z * affine).min(max(&|c| c.w) * over_z)
             }
             Some(apex) => {
-                let middle = corners
-                    .iter()
-                    .map(|c| c.p - apex)
-                    .sum::<DVec3>()
-                    .normalize_or_zero();
+                let middle = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
                 let share = max(&|c| {
                     let along = (c.p - apex).dot(middle);
-                    if along > 0.0 {
-                        c.w / along
-                    } else {
-                        f64::INFINITY
-                    }
+                    if along > 0.0 { c.w / along } else { f64::INFINITY }
                 });
                 share * max(&|c| c.errors[i] * c.r / c.w)
             }
         };
-        [norm(0), t, norm(2)]
+        [norm(0), t, norm(2) * spread]
     }
 }

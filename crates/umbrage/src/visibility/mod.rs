@@ -102,7 +102,9 @@ fn nearest_lit(map: &ShadowMap, receiver: &Receiver, i: i32, j: i32) -> f64 {
         map.rows.t_from_row((f64::from(j) + 0.5) / height),
     );
     let rise = receiver.slope.dot(center - receiver.st);
-    if rise.is_nan() { return f64::NEG_INFINITY; }
+    if rise.is_nan() {
+        return f64::NEG_INFINITY;
+    }
     let plane = receiver.depth + rise;
     let r = match *VARIANT {
         0 => plane,

@@ -14,9 +14,7 @@ pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective
     let end = (family.farthest / family.nearest).ln() + 1.0;
     const STEPS: usize = 12;
     let at = |i: usize| end * (i as f64) / STEPS as f64;
-    let best = (0..=STEPS)
-        .map(|i| (cost(at(i)), i))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = (0..=STEPS).map(|i| (cost(at(i)), i)).min_by(|a, b| a.0.total_cmp(&b.0));
     let best = best.map_or(0, |(_, i)| i);
     let (mut lo, mut hi) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
     // Golden section; 36 steps shrink the bracket by 3e-8.
@@ -36,11 +34,7 @@ pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective
     }
     let omega = lo.midpoint(hi);
     // The bracket's lower end may be the minimum itself: no warp at all.
-    if cost(0.0) <= cost(omega) {
-        0.0
-    } else {
-        omega.exp_m1()
-    }
+    if cost(0.0) <= cost(omega) { 0.0 } else { omega.exp_m1() }
 }
 
 /// Logarithm of the quantity to make small.

@@ -33,10 +33,7 @@ impl LightSpace {
                 let r = middle - apex;
                 let depth = direction.dot(r);
                 // Derivative of the light's image of `middle` as it moves along the view.
-                (
-                    r.normalize(),
-                    (view - r * (direction.dot(view) / depth)) / depth,
-                )
+                (r.normalize(), (view - r * (direction.dot(view) / depth)) / depth)
             }
         };
         let z = slope - direction * direction.dot(slope);
@@ -44,10 +41,8 @@ impl LightSpace {
         let theta_rad = beam.dot(view).clamp(-1.0, 1.0).acos();
         // Looking exactly along the light any z will do. Up in the picture is one that keeps
         // still while the viewer moves.
-        let z = z
-            .try_normalize()
-            .filter(|_| beam.cross(view).length() > 1e-12)
-            .unwrap_or_else(|| {
+        let z =
+            z.try_normalize().filter(|_| beam.cross(view).length() > 1e-12).unwrap_or_else(|| {
                 let up = camera.up();
                 (up - direction * direction.dot(up))
                     .try_normalize()
@@ -70,31 +65,33 @@ impl LightSpace {
         theta_rad: f64,
         z_per_view_metre: f64,
     ) -> Self {
+        // z came out of a difference that cancels as the view turns into the light.
+        let z = (z - direction * direction.dot(z)).normalize();
         let x = z.cross(direction);
         let row = |axis: DVec3| axis.extend(-axis.dot(apex.unwrap_or(DVec3::ZERO)));
         let (y, w) = match apex {
             None => (row(-direction), DVec4::W),
             Some(_) => (DVec4::W, row(direction)),
         };
-        Self {
-            x: row(x),
-            y,
-            z: row(z),
-            w,
-            apex,
-            theta_rad,
-            z_per_view_metre,
-        }
+        Self { x: row(x), y, z: row(z), w, apex, theta_rad, z_per_view_metre }
     }
 
     /// (x, z) and y of a local point; the divisor must be positive there.
     pub(crate) fn project(&self, p: DVec3) -> (DVec2, f64) {
         let p = p.extend(1.0);
         let w = self.w.dot(p);
-        (
-            DVec2::new(self.x.dot(p), self.z.dot(p)) / w,
-            self.y.dot(p) / w,
-        )
+        (DVec2::new(self.x.dot(p), self.z.dot(p)) / w, self.y.dot(p) / w)
+    }
+
+    /// Inverse of [`light_from_local`](Self::light_from_local).
+    pub(crate) fn local_from_light(&self) -> DMat4 {
+        let [x, y, z, w] = [self.x, self.y, self.z, self.w].map(DVec4::truncate);
+        match self.apex {
+            None => DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), DVec4::W),
+            Some(apex) => {
+                DMat4::from_cols(x.extend(0.0), apex.extend(1.0), z.extend(0.0), w.extend(0.0))
+            }
+        }
     }
 
     /// The rows x, y, z, w as a matrix.
@@ -111,14 +108,10 @@ struct Base {
 impl Base {
     fn of(light: &Light, camera: &Camera) -> Self {
         match *light {
-            Light::Directional { direction } => Self {
-                direction,
-                apex: None,
-            },
-            Light::Spot(spot) => Self {
-                direction: spot.direction,
-                apex: Some(spot.position - camera.eye()),
-            },
+            Light::Directional { direction } => Self { direction, apex: None },
+            Light::Spot(spot) => {
+                Self { direction: spot.direction, apex: Some(spot.position - camera.eye()) }
+            }
         }
     }
 }

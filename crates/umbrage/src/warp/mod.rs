@@ -43,13 +43,7 @@ impl Seen {
                 (base, u.cross(v).length() / base)
             }
         };
-        Self {
-            xz,
-            y,
-            depth,
-            base: base / depth,
-            height: height / depth,
-        }
+        Self { xz, y, depth, base: base / depth, height: height / depth }
     }
 }
 
@@ -73,31 +67,17 @@ impl OnePoint {
         let range = |f: fn(&Seen) -> f64| {
             seen.iter()
                 .map(f)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| {
-                    (lo.min(v), hi.max(v))
-                })
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
         };
         let (x0, x1) = range(|p| p.xz.x);
         let (z0, z1) = range(|p| p.xz.y);
         let (nearest, farthest) = range(|p| p.depth);
         // The viewer is local space's origin. After a spot light's perspective he may lie at or
         // beyond infinity, so there the middle of what he sees stands in for him.
-        let center_x = if space.apex.is_some() {
-            x0.midpoint(x1)
-        } else {
-            0.0
-        };
+        let center_x = if space.apex.is_some() { x0.midpoint(x1) } else { 0.0 };
         // A body that is flat and parallel to the light has no depth range.
-        let mu = (z1 - z0)
-            .max(1e-9 * (x1 - x0))
-            .max(f64::MIN_POSITIVE.sqrt());
-        Self {
-            center_x,
-            z0,
-            mu,
-            nearest,
-            farthest,
-        }
+        let mu = (z1 - z0).max(1e-9 * (x1 - x0)).max(f64::MIN_POSITIVE.sqrt());
+        Self { center_x, z0, mu, nearest, farthest }
     }
 
     /// w relative to the near plane's.
@@ -107,11 +87,10 @@ impl OnePoint {
 
     /// Range of x/w over the points seen.
     fn extent(&self, nu: f64, seen: &[Seen]) -> (f64, f64) {
-        seen.iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-                let x = (p.xz.x - self.center_x) / self.w(nu, p.xz.y);
-                (lo.min(x), hi.max(x))
-            })
+        seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
+            let x = (p.xz.x - self.center_x) / self.w(nu, p.xz.y);
+            (lo.min(x), hi.max(x))
+        })
     }
 
     /// The homography of strength ν, fitted to the points seen.
@@ -136,21 +115,17 @@ impl OnePoint {
     ) -> f64 {
         let sin_theta = space.theta_rad.sin();
         let (n, f) = (self.nearest, self.farthest);
-        // Light-space units per metre of the light plane; 1 for directional lights.
-        let unit = if sin_theta > 0.0 {
-            space.z_per_view_metre / sin_theta
-        } else {
-            0.0
-        };
-        let mu_metres = self.mu / unit.max(f64::MIN_POSITIVE);
-        let nu_from_metres = |lambda: f64| {
-            if lambda > 0.0 {
-                mu_metres / lambda
-            } else {
-                0.0
-            }
-        };
-        let nu_perspective = sin_theta * nu_from_metres(n);
+        // Light-space units per metre of the light plane: 1 for directional lights. Looking along the
+        // light it loses its meaning, and so does every warp that follows the view.
+        let unit = space.z_per_view_metre / sin_theta;
+        if !(sin_theta > 1e-12 && unit > 0.0)
+            && !matches!(warp, Warp::Lambda(_) | Warp::Adaptive(_))
+        {
+            return 0.0;
+        }
+        let mu_metres = self.mu / unit;
+        // Strength of the view's own perspective, λ = n/sin θ.
+        let nu_perspective = sin_theta * mu_metres / n;
         match warp {
             Warp::Unfocused | Warp::Uniform | Warp::Psm => 0.0,
             Warp::Lambda(lambda) => self.mu / lambda,
@@ -158,7 +133,7 @@ impl OnePoint {
             Warp::Log => nu_perspective,
             Warp::Lispsm => {
                 let f = n + (f - n).min(mu_metres * sin_theta);
-                sin_theta * nu_from_metres(n + (n * f).sqrt())
+                sin_theta * mu_metres / (n + (n * f).sqrt())
             }
             Warp::Tsm { focus } => {
                 let focus = focus.unwrap_or((n * f).sqrt());

@@ -82,8 +82,5 @@ fn middle_of_cone(vertices: &[DVec3], direction: impl Fn(DVec3) -> DVec3) -> Opt
         x -= step * (gap / step.length_squared()).min(1.0);
     }
     let axis = x.try_normalize()?;
-    vertices
-        .iter()
-        .all(|&v| direction(v).dot(axis) > 1e-6)
-        .then_some(axis)
+    vertices.iter().all(|&v| direction(v).dot(axis) > 1e-6).then_some(axis)
 }

@@ -1,0 +1,196 @@
+//! Random but valid views, lights and bounds, and brute-force geometry to check plans against.
+#![allow(dead_code, reason = "each test file uses its own share of this module")]
+
+use glam::DVec3;
+use proptest::prelude::*;
+use umbrage::{
+    Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Plane, Size, SpotLight, Warp,
+};
+
+/// Every warp, by name.
+pub(crate) const WARPS: [(&str, Warp); 10] = [
+    ("unfocused", Warp::Unfocused),
+    ("uniform", Warp::Uniform),
+    ("psm", Warp::Psm),
+    ("lispsm", Warp::Lispsm),
+    ("tsm", Warp::Tsm { focus: None }),
+    ("tsm(focus)", Warp::Tsm { focus: Some(3.0) }),
+    ("adaptive", Warp::Adaptive(Objective::Storage)),
+    ("adaptive(area)", Warp::Adaptive(Objective::Area)),
+    ("log", Warp::Log),
+    ("lambda=7", Warp::Lambda(7.0)),
+];
+
+#[derive(Clone, Debug)]
+pub(crate) struct Config {
+    pub camera: Camera,
+    pub light: Light,
+    pub bounds: Bounds,
+}
+
+pub(crate) fn options(warp: Warp) -> Options {
+    Options { warp, size: Size::Budget(1 << 20), max_side: 1 << 16 }
+}
+
+pub(crate) fn direction() -> impl Strategy<Value = DVec3> {
+    (-1.0..1.0f64, 0.0..std::f64::consts::TAU).prop_map(|(y, a)| {
+        let r = (1.0 - y * y).sqrt();
+        DVec3::new(r * a.cos(), y, r * a.sin())
+    })
+}
+
+fn log_range(lo: f64, hi: f64) -> impl Strategy<Value = f64> {
+    (lo.ln()..hi.ln()).prop_map(f64::exp)
+}
+
+pub(crate) fn camera() -> impl Strategy<Value = Camera> {
+    let eye = prop_oneof![
+        3 => Just(1.0),
+        2 => Just(100.0),
+        1 => Just(1e5),
+    ]
+    .prop_flat_map(|r| [-r..r, -r..r, -r..r].prop_map(DVec3::from));
+    (
+        eye,
+        direction(),
+        direction(),
+        10.0..120.0f64,
+        log_range(0.01, 10.0),
+        log_range(1.001, 1e4),
+        prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
+    )
+        .prop_map(|(eye, forward, up, fov, near, ratio, image)| {
+            Camera::look_at(LookAt {
+                eye,
+                target: eye + forward,
+                up,
+                fov_y_rad: fov.to_radians(),
+                near,
+                far: near * ratio,
+                image,
+            })
+            .expect("a valid camera")
+        })
+}
+
+/// A direction anywhere, or within a hair of the view or of its opposite.
+fn sun(camera: Camera) -> impl Strategy<Value = Light> {
+    prop_oneof![
+        4 => direction(),
+        1 => (direction(), log_range(1e-9, 0.3), any::<bool>()).prop_map(move |(d, r, back)| {
+            let view = if back { -camera.forward() } else { camera.forward() };
+            view + d * r
+        }),
+    ]
+    .prop_map(|direction| Light::Directional { direction })
+}
+
+/// A spot light that shines at something amid the view.
+fn spot(camera: Camera) -> impl Strategy<Value = Light> {
+    ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
+        move |([x, y, z], from, half, distance)| {
+            let seen = point_in_view(&camera, [x, y, z]);
+            let distance = distance * camera.far();
+            Light::Spot(SpotLight {
+                position: seen - from * distance,
+                direction: from,
+                half_angle_rad: half.to_radians(),
+                near: distance * 0.01,
+                range: distance * 2.0,
+            })
+        },
+    )
+}
+
+pub(crate) fn config() -> impl Strategy<Value = Config> {
+    camera().prop_flat_map(|camera| {
+        let light = prop_oneof![3 => sun(camera).boxed(), 1 => spot(camera).boxed()];
+        let unit = || [0.0..1.0f64, 0.0..1.0, 0.0..1.0];
+        let receivers =
+            proptest::option::of((unit(), unit(), 0usize..4).prop_map(move |(a, b, flat)| {
+                let mut b = point_in_view(&camera, b);
+                let a = point_in_view(&camera, a);
+                // Some worlds are a floor, with no thickness at all.
+                if flat < 3 {
+                    b[flat] = a[flat];
+                }
+                Aabb::new(a, b)
+            }));
+        (Just(camera), light, receivers).prop_map(|(camera, light, receivers)| Config {
+            camera,
+            light,
+            bounds: Bounds { receivers, casters: receivers },
+        })
+    })
+}
+
+/// A point of the view frustum: x and y across the picture, z from near to far, denser nearby.
+pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
+    let [w, h] = camera.image().map(f64::from);
+    let depth = camera.near() * (camera.far() / camera.near()).powf(z);
+    camera.eye() + camera.ray(glam::DVec2::new(x * w, y * h)) * depth
+}
+
+impl Config {
+    /// Half-spaces whose intersection is the body that the camera sees in the light, relative to the eye;
+    /// derived here anew, without the library's focus.
+    pub(crate) fn half_spaces(&self) -> Vec<Plane> {
+        let camera = &self.camera;
+        let [w, h] = camera.image().map(f64::from);
+        let corner = |x, y| camera.ray(glam::DVec2::new(x, y));
+        let rays = [corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h)];
+        let mut planes: Vec<Plane> = (0..4)
+            .map(|i| {
+                let n = rays[i].cross(rays[(i + 1) % 4]).normalize();
+                let inwards = if n.dot(camera.forward()) < 0.0 { -n } else { n };
+                Plane { normal: inwards, offset: 0.0 }
+            })
+            .collect();
+        planes.push(Plane { normal: camera.forward(), offset: -camera.near() });
+        planes.push(Plane { normal: -camera.forward(), offset: camera.far() });
+        if let Some(b) = self.bounds.receivers {
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                planes.push(Plane::through(b.min - camera.eye(), axis));
+                planes.push(Plane::through(b.max - camera.eye(), -axis));
+            }
+        }
+        if let Light::Spot(spot) = self.light {
+            let apex = spot.position - camera.eye();
+            let axis = spot.direction.normalize();
+            planes.push(Plane::through(apex + axis * spot.near, axis));
+            planes.push(Plane::through(apex + axis * spot.range, -axis));
+        }
+        planes
+    }
+
+    /// Whether the camera sees `world` in the light, within the bounds.
+    pub(crate) fn sees(&self, world: DVec3) -> bool {
+        let local = world - self.camera.eye();
+        let slack = 1e-12 * self.camera.far();
+        self.half_spaces().iter().all(|p| p.distance(local) >= -slack) && self.lights(world)
+    }
+
+    fn lights(&self, world: DVec3) -> bool {
+        match self.light {
+            Light::Directional { .. } => true,
+            Light::Spot(spot) => {
+                let r = world - spot.position;
+                r.dot(spot.direction)
+                    > r.length() * spot.direction.length() * spot.half_angle_rad.cos()
+            }
+        }
+    }
+
+    /// Random points that the camera sees in the light, from numbers in [0, 1].
+    pub(crate) fn seen_points(&self, numbers: &[[f64; 3]]) -> Vec<DVec3> {
+        let in_box = |[x, y, z]: [f64; 3]| {
+            self.bounds.receivers.map(|b| b.min + b.size() * DVec3::new(x, y, z))
+        };
+        numbers
+            .iter()
+            .flat_map(|&n| [Some(point_in_view(&self.camera, n)), in_box(n)])
+            .flatten()
+            .filter(|&p| self.sees(p))
+            .collect()
+    }
+}

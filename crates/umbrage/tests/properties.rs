@@ -1,0 +1,157 @@
+//! What must hold of every plan, over random cameras, lights and bounds.
+
+mod common;
+
+use common::{WARPS, config, options};
+use glam::DVec3;
+use proptest::prelude::*;
+use umbrage::{Aabb, Light, Objective, Planner, Warp};
+
+fn numbers() -> impl Strategy<Value = Vec<[f64; 3]>> {
+    proptest::collection::vec([0.0..=1.0f64, 0.0..=1.0, 0.0..=1.0], 24)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Every receiver lands in the map; its casters share its texel, lie nearer the light and are not
+    /// culled; no point's error exceeds the reported maximum.
+    #[test]
+    fn receivers_casters_and_errors(config in config(), numbers in numbers(), pick in 0..WARPS.len()) {
+        let (name, warp) = WARPS[pick];
+        let mut planner = Planner::new();
+        let plan = planner.plan(&config.camera, &config.light, &config.bounds, &options(warp)).unwrap();
+        let map = &plan.maps[0];
+        prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite(), "{name}");
+        let seen = config.seen_points(&numbers);
+        if map.is_empty() {
+            prop_assert!(seen.is_empty(), "{name}: an empty map for a view that sees something");
+            return Ok(());
+        }
+        prop_assert!(map.texels() <= 1 << 20);
+        let [res_s, res_t] = map.resolution.map(f64::from);
+        // World coordinates carry rounding of their own, worth this much of the scene.
+        let rounding = config.camera.eye().abs().max_element() * 1e-15;
+        for p in seen {
+            let Some(shadow) = map.project(p) else {
+                return Err(TestCaseError::fail(format!("{name}: {p} is behind the map")));
+            };
+            let error = map.perspective_error(&config.camera, p).unwrap();
+            let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+            // Rounding in texels, from its size in metres and the texel's size in metres.
+            let slack_s = 1e-7 + rounding / (error.s * pixel * res_s);
+            let slack_t = 1e-7 + rounding / (error.t * pixel * res_t);
+            prop_assert!((-slack_s..=1.0 + slack_s).contains(&shadow.x), "{name}: s = {}", shadow.x);
+            prop_assert!((-slack_t..=1.0 + slack_t).contains(&shadow.y), "{name}: t = {}", shadow.y);
+            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&shadow.z), "{name}: depth = {}", shadow.z);
+            let bound = 1.0 + 1e-6;
+            prop_assert!(error.s <= map.error.max_s * bound, "{name}: s {} > {}", error.s, map.error.max_s);
+            prop_assert!(error.t <= map.error.max_t * bound, "{name}: t {} > {}", error.t, map.error.max_t);
+            prop_assert!(error.worst <= map.error.max * bound, "{name}: {} > {}", error.worst, map.error.max);
+
+            let reach = match config.light {
+                Light::Directional { .. } => 10.0 * config.camera.far(),
+                Light::Spot(spot) => 0.9 * p.distance(spot.position),
+            };
+            let caster = p + config.light.direction_to_light(p) * reach;
+            let Some(casts) = map.project(caster) else {
+                return Err(TestCaseError::fail(format!("{name}: no caster at {caster}, {map:?}")));
+            };
+            let texel = 1e-5 + rounding * reach / config.camera.near() / pixel;
+            prop_assert!(((casts - shadow).x * res_s).abs() < texel, "{name}: {casts} from {shadow}");
+            prop_assert!(((casts - shadow).y * res_t).abs() < texel, "{name}: {casts} from {shadow}");
+            prop_assert!(casts.z < shadow.z, "{name}: caster at depth {} over {}", casts.z, shadow.z);
+            prop_assert!(map.may_cast(Aabb::new(caster, caster)), "{name}: a caster is culled");
+            let Some(beam) = map.beam(shadow.truncate()) else {
+                return Err(TestCaseError::fail(format!("{name}: no beam at {shadow}, {map:?}")));
+            };
+            let off = (p - beam.origin).reject_from_normalized(beam.direction).length();
+            prop_assert!(off <= 1e-5 * pixel + 1e-6 * error.worst * pixel + 10.0 * rounding, "{name}: beam misses by {off}");
+        }
+    }
+
+    /// `adaptive` needs no more texels than `uniform` for the same error, however little warping helps.
+    #[test]
+    fn uniform_needs_at_least_adaptive(config in config()) {
+        let mut planner = Planner::new();
+        let mut storage = |warp| {
+            let plan = planner.plan(&config.camera, &config.light, &config.bounds, &options(warp)).unwrap();
+            plan.storage_factor()
+        };
+        let uniform = storage(Warp::Uniform);
+        let adaptive = storage(Warp::Adaptive(Objective::Storage));
+        // The reported maxima are known to half a per cent each.
+        prop_assert!(adaptive <= uniform * 1.011, "{adaptive} > {uniform}");
+    }
+}
+
+/// The reported maxima are reached to 2%: they are compared with the errors at the body's corners and
+/// along its edges, found by brute force from all triples and pairs of its planes.
+#[test]
+fn maxima_are_reached() {
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: 1_000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let suns =
+        config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. }));
+    runner
+        .run(&suns, |config| {
+            let corners = corners(&config);
+            prop_assume!(corners.len() >= 4);
+            let mut planner = Planner::new();
+            for (name, warp) in WARPS {
+                let plan = planner
+                    .plan(&config.camera, &config.light, &config.bounds, &options(warp))
+                    .unwrap();
+                let map = &plan.maps[0];
+                prop_assert!(!map.is_empty());
+                let mut reached = [0f64; 3];
+                for (i, a) in corners.iter().enumerate() {
+                    for b in &corners[..=i] {
+                        for k in 0..=20 {
+                            let p = config.camera.eye() + a.lerp(*b, f64::from(k) / 20.0);
+                            if let Some(e) = map.perspective_error(&config.camera, p) {
+                                for (r, e) in reached.iter_mut().zip([e.s, e.t, e.worst]) {
+                                    *r = r.max(e);
+                                }
+                            }
+                        }
+                    }
+                }
+                let reported = [map.error.max_s, map.error.max_t, map.error.max];
+                for (reported, reached) in reported.into_iter().zip(reached) {
+                    prop_assert!(reached >= 0.98 * reported, "{name}: {reached} of {reported}");
+                }
+            }
+            Ok(())
+        })
+        .unwrap();
+}
+
+/// Corners of the body seen, relative to the eye: all intersections of three planes inside the others.
+fn corners(config: &common::Config) -> Vec<DVec3> {
+    let planes = config.half_spaces();
+    let slack = 1e-9 * config.camera.far();
+    let mut corners = Vec::new();
+    for i in 0..planes.len() {
+        for j in 0..i {
+            for k in 0..j {
+                let [a, b, c] = [i, j, k].map(|i| planes[i]);
+                let det = a.normal.dot(b.normal.cross(c.normal));
+                if det.abs() < 1e-9 {
+                    continue;
+                }
+                let p = -(b.normal.cross(c.normal) * a.offset
+                    + c.normal.cross(a.normal) * b.offset
+                    + a.normal.cross(b.normal) * c.offset)
+                    / det;
+                if planes.iter().all(|q| q.distance(p) >= -slack) {
+                    corners.push(p);
+                }
+            }
+        }
+    }
+    corners
+}
