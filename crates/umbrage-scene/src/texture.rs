@@ -6,11 +6,7 @@ use std::sync::LazyLock;
 static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|i| {
         let c = i as f32 / 255.0;
-        if c <= 0.04045 {
-            c / 12.92
-        } else {
-            ((c + 0.055) / 1.055).powf(2.4)
-        }
+        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
     })
 });
 
@@ -40,11 +36,8 @@ impl Texture {
         let [w, h] = self.size;
         let (x0, x1, fx) = neighbours(uv.x, w, self.wrap[0]);
         let (y0, y1, fy) = neighbours(uv.y, h, self.wrap[1]);
-        let at = |x: usize, y: usize| {
-            self.rgba
-                .get(y * w as usize + x)
-                .map_or(otherwise, |&p| pixel(p))
-        };
+        let at =
+            |x: usize, y: usize| self.rgba.get(y * w as usize + x).map_or(otherwise, |&p| pixel(p));
         let upper = at(x0, y0) * (1.0 - fx) + at(x1, y0) * fx;
         let lower = at(x0, y1) * (1.0 - fx) + at(x1, y1) * fx;
         upper * (1.0 - fy) + lower * fy
@@ -53,11 +46,7 @@ impl Texture {
 
 /// The two pixels whose centres enclose a texture coordinate, and the second one's weight.
 fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
-    let c = if coordinate.is_finite() {
-        coordinate
-    } else {
-        0.0
-    };
+    let c = if coordinate.is_finite() { coordinate } else { 0.0 };
     // Reduced to one period first, so that far coordinates keep their precision.
     let c = match wrap {
         Wrap::Repeat => c.rem_euclid(1.0),
@@ -75,11 +64,7 @@ fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
         Wrap::Clamp => i.clamp(0, n - 1),
     };
     let first = x.floor();
-    (
-        index(first as i64) as usize,
-        index(first as i64 + 1) as usize,
-        x - first,
-    )
+    (index(first as i64) as usize, index(first as i64 + 1) as usize, x - first)
 }
 
 #[cfg(test)]
@@ -88,35 +73,21 @@ mod tests {
 
     fn checker(wrap: Wrap) -> Texture {
         let (black, white) = ([0, 0, 0, 255], [255, 255, 255, 0]);
-        Texture {
-            size: [2, 2],
-            rgba: vec![black, white, white, black],
-            wrap: [wrap; 2],
-        }
+        Texture { size: [2, 2], rgba: vec![black, white, white, black], wrap: [wrap; 2] }
     }
 
     #[test]
     fn pixel_centres_are_exact_and_the_middle_is_their_mean() {
         let t = checker(Wrap::Clamp);
-        assert_eq!(
-            t.sample(Vec2::new(0.25, 0.25)),
-            Vec4::new(0.0, 0.0, 0.0, 1.0)
-        );
-        assert_eq!(
-            t.sample(Vec2::new(0.75, 0.25)),
-            Vec4::new(1.0, 1.0, 1.0, 0.0)
-        );
+        assert_eq!(t.sample(Vec2::new(0.25, 0.25)), Vec4::new(0.0, 0.0, 0.0, 1.0));
+        assert_eq!(t.sample(Vec2::new(0.75, 0.25)), Vec4::new(1.0, 1.0, 1.0, 0.0));
         assert_eq!(t.sample(Vec2::splat(0.5)), Vec4::splat(0.5));
         assert_eq!(t.sample_alpha(Vec2::new(0.75, 0.25)), 0.0);
     }
 
     #[test]
     fn colour_is_decoded_from_srgb_and_alpha_is_not() {
-        let t = Texture {
-            size: [1, 1],
-            rgba: vec![[188, 10, 0, 128]],
-            wrap: Default::default(),
-        };
+        let t = Texture { size: [1, 1], rgba: vec![[188, 10, 0, 128]], wrap: Default::default() };
         let s = t.sample(Vec2::new(7.3, -2.9));
         assert!((s.x - 0.5029).abs() < 1e-4, "{s}");
         assert!((s.y - 10.0 / 255.0 / 12.92).abs() < 1e-7, "{s}");
@@ -139,15 +110,7 @@ mod tests {
     #[test]
     fn any_coordinates_and_any_texture_give_a_finite_colour() {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
-            for u in [
-                f32::NAN,
-                f32::INFINITY,
-                f32::MIN,
-                f32::MAX,
-                1e20,
-                -1e-30,
-                0.999_999_94,
-            ] {
+            for u in [f32::NAN, f32::INFINITY, f32::MIN, f32::MAX, 1e20, -1e-30, 0.999_999_94] {
                 for t in [checker(wrap), Texture::default()] {
                     assert!(t.sample(Vec2::new(u, 0.1)).is_finite());
                     assert!(t.sample(Vec2::new(0.1, u)).is_finite());

@@ -139,10 +139,7 @@ pub struct Notice(pub String);
 impl Scene {
     /// Triangles as drawn: each instance counts its mesh's.
     pub fn drawn_triangles(&self) -> u64 {
-        self.instances
-            .iter()
-            .map(|i| self.meshes[i.mesh].triangles.len() as u64)
-            .sum()
+        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len() as u64).sum()
     }
 
     /// Triangles as stored.

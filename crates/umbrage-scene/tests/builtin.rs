@@ -18,29 +18,20 @@ fn every_scene_is_sound_at_small_and_default_size() {
 }
 
 fn assert_sound(scene: &Scene, what: &str) {
-    assert!(
-        !scene.cameras.is_empty() && !scene.lights.is_empty(),
-        "{what}: view and sun"
-    );
+    assert!(!scene.cameras.is_empty() && !scene.lights.is_empty(), "{what}: view and sun");
     assert!(scene.notices.is_empty(), "{what}");
     assert!(!scene.instances.is_empty(), "{what}");
     for i in &scene.instances {
         assert!(i.mesh < scene.meshes.len(), "{what}");
         assert!(i.world_from_mesh.is_finite(), "{what}");
-        assert!(
-            i.world_from_mesh.matrix3.determinant().abs() > 1e-12,
-            "{what}"
-        );
+        assert!(i.world_from_mesh.matrix3.determinant().abs() > 1e-12, "{what}");
     }
     for (k, m) in scene.meshes.iter().enumerate() {
         let what = format!("{what}, mesh {k} of {}", scene.materials[m.material].name);
         let n = m.positions.len();
         assert!(m.positions.iter().all(|p| p.is_finite()), "{what}");
         assert_eq!(m.normals.len(), n, "{what}");
-        assert!(
-            m.normals.iter().all(|p| (p.length() - 1.0).abs() < 1e-4),
-            "{what}: normals"
-        );
+        assert!(m.normals.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "{what}: normals");
         assert!(m.uvs.is_empty() || m.uvs.len() == n, "{what}");
         assert!(m.uvs.iter().all(|p| p.is_finite()), "{what}");
         assert!(!m.triangles.is_empty(), "{what}");
@@ -53,18 +44,12 @@ fn assert_sound(scene: &Scene, what: &str) {
             let shading: Vec3 = t.iter().map(|&i| m.normals[i as usize]).sum();
             inside_out += usize::from(face.dot(shading) <= 0.0);
         }
-        assert!(
-            inside_out * 500 <= m.triangles.len(),
-            "{what}: {inside_out} faces inside out"
-        );
+        assert!(inside_out * 500 <= m.triangles.len(), "{what}: {inside_out} faces inside out");
     }
     let bounds = scene.bounds();
     assert!(!bounds.is_empty(), "{what}");
     for c in &scene.cameras {
-        assert!(
-            0.0 < c.near && c.near < c.far && c.far.is_finite(),
-            "{what}"
-        );
+        assert!(0.0 < c.near && c.near < c.far && c.far.is_finite(), "{what}");
         assert!((c.target - c.eye).length() > 0.0, "{what}");
     }
 }
@@ -73,26 +58,12 @@ fn assert_sound(scene: &Scene, what: &str) {
 fn default_sizes_build_quickly_and_largest_reach_millions() {
     for info in builtins() {
         let scene = builtin(info.name, None).unwrap();
-        assert!(
-            scene.stored_triangles() <= 300_000,
-            "{}: {}",
-            info.name,
-            scene.stored_triangles()
-        );
-        assert!(
-            scene.drawn_triangles() <= 1_000_000,
-            "{}: {}",
-            info.name,
-            scene.drawn_triangles()
-        );
+        assert!(scene.stored_triangles() <= 300_000, "{}: {}", info.name, scene.stored_triangles());
+        assert!(scene.drawn_triangles() <= 1_000_000, "{}: {}", info.name, scene.drawn_triangles());
         let [a, b] = [info.max_size / 8, info.max_size / 4]
             .map(|s| builtin(info.name, Some(s)).unwrap().drawn_triangles() as f64);
         // The growth from one to the next, twice more.
-        assert!(
-            b * (b / a).powi(2) > 4e6,
-            "{}: {a} and {b} triangles",
-            info.name
-        );
+        assert!(b * (b / a).powi(2) > 4e6, "{}: {a} and {b} triangles", info.name);
     }
 }
 
@@ -108,20 +79,8 @@ fn same_again() {
 #[test]
 fn unknown_names_and_sizes_are_refused_helpfully() {
     let e = builtin("shpere", None).unwrap_err();
-    assert!(
-        matches!(
-            e,
-            SceneError::UnknownBuiltin {
-                nearest: "sphere",
-                ..
-            }
-        ),
-        "{e}"
-    );
-    assert_eq!(
-        e.to_string(),
-        r#"no built-in scene is called "shpere"; did you mean "sphere"?"#
-    );
+    assert!(matches!(e, SceneError::UnknownBuiltin { nearest: "sphere", .. }), "{e}");
+    assert_eq!(e.to_string(), r#"no built-in scene is called "shpere"; did you mean "sphere"?"#);
     for info in builtins() {
         for size in [0, info.max_size + 1, u32::MAX] {
             let e = builtin(info.name, Some(size)).unwrap_err();
@@ -136,10 +95,8 @@ fn blocked(scene: &Scene, from: DVec3, to_light: DVec3) -> bool {
     scene.instances.iter().any(|i| {
         let mesh = &scene.meshes[i.mesh];
         mesh.triangles.iter().any(|t| {
-            let [a, b, c] = t.map(|k| {
-                i.world_from_mesh
-                    .transform_point3(mesh.positions[k as usize].as_dvec3())
-            });
+            let [a, b, c] = t
+                .map(|k| i.world_from_mesh.transform_point3(mesh.positions[k as usize].as_dvec3()));
             // Möller and Trumbore 1997.
             let (e1, e2) = (b - a, c - a);
             let p = to_light.cross(e2);
@@ -162,18 +119,11 @@ fn closed_forms_agree_with_their_geometry() {
     ];
     for (name, size, shadows) in forms {
         let scene = builtin(name, Some(size)).unwrap();
-        for direction in [
-            DVec3::new(0.7, -1.0, 0.3),
-            DVec3::new(-0.9, -0.8, 0.0),
-            DVec3::NEG_Y,
-        ] {
+        for direction in [DVec3::new(0.7, -1.0, 0.3), DVec3::new(-0.9, -0.8, 0.0), DVec3::NEG_Y] {
             let mut dark = 0;
             for k in 0..4000 {
                 // A spiral around the origin: dense at the foot of things, as far as shadows reach.
-                let (r, a) = (
-                    7.0 * (f64::from(k) + 0.5) / 4000.0,
-                    f64::from(k) * 2.399_963,
-                );
+                let (r, a) = (7.0 * (f64::from(k) + 0.5) / 4000.0, f64::from(k) * 2.399_963);
                 let p = DVec3::new(r * a.cos(), 0.0, r * a.sin());
                 let step = 4e-3;
                 let around = [DVec3::ZERO, DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z];
@@ -183,16 +133,9 @@ fn closed_forms_agree_with_their_geometry() {
                     continue; // On the outline either answer is right.
                 }
                 dark += usize::from(expected);
-                assert_eq!(
-                    blocked(&scene, p, -direction),
-                    expected,
-                    "{name}, {direction}: {p}"
-                );
+                assert_eq!(blocked(&scene, p, -direction), expected, "{name}, {direction}: {p}");
             }
-            assert!(
-                dark > 20,
-                "{name}, {direction}: only {dark} points in shadow were tried"
-            );
+            assert!(dark > 20, "{name}, {direction}: only {dark} points in shadow were tried");
         }
     }
 }

@@ -40,11 +40,7 @@ fn folder() -> PathBuf {
 
 fn scene(file: &str) -> Scene {
     let path = folder().join(file);
-    assert!(
-        path.exists(),
-        "{}: missing; set UMBRAGE_SCENES to its folder",
-        path.display()
-    );
+    assert!(path.exists(), "{}: missing; set UMBRAGE_SCENES to its folder", path.display());
     load(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -57,30 +53,18 @@ fn all_load_with_their_triangles_and_sizes() {
         for m in &s.meshes {
             assert!(m.positions.iter().all(|p| p.is_finite()), "{file}");
             assert_eq!(m.normals.len(), m.positions.len(), "{file}");
-            assert!(
-                m.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5),
-                "{file}"
-            );
-            assert!(
-                m.uvs.is_empty() || m.uvs.len() == m.positions.len(),
-                "{file}"
-            );
+            assert!(m.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5), "{file}");
+            assert!(m.uvs.is_empty() || m.uvs.len() == m.positions.len(), "{file}");
             let n = m.positions.len() as u32;
             assert!(m.triangles.iter().flatten().all(|&i| i < n), "{file}");
             assert!(m.material < s.materials.len(), "{file}");
         }
         for i in &s.instances {
-            assert!(
-                i.world_from_mesh.is_finite() && i.mesh < s.meshes.len(),
-                "{file}"
-            );
+            assert!(i.world_from_mesh.is_finite() && i.mesh < s.meshes.len(), "{file}");
         }
         let found = s.bounds().size().to_array();
         for (found, size) in found.into_iter().zip(size) {
-            assert!(
-                (found / size - 1.0).abs() < 6e-3,
-                "{file}: {found} is not {size} m"
-            );
+            assert!((found / size - 1.0).abs() < 6e-3, "{file}: {found} is not {size} m");
         }
     }
 }
@@ -89,28 +73,16 @@ fn all_load_with_their_triangles_and_sizes() {
 fn leaves_are_masked_by_their_textures() {
     let forest = scene("trees/forest_eztree.glb");
     assert_eq!(forest.notices, []);
-    let masked: Vec<_> = forest
-        .materials
-        .iter()
-        .filter(|m| matches!(m.alpha, Alpha::Mask { .. }))
-        .collect();
+    let masked: Vec<_> =
+        forest.materials.iter().filter(|m| matches!(m.alpha, Alpha::Mask { .. })).collect();
     assert_eq!(masked.len(), 6);
-    assert!(
-        masked
-            .iter()
-            .any(|m| m.alpha == Alpha::Mask { cutoff: 0.3 }),
-        "pine"
-    );
+    assert!(masked.iter().any(|m| m.alpha == Alpha::Mask { cutoff: 0.3 }), "pine");
     for m in masked {
         assert!(m.double_sided, "{}", m.name);
         let texture = &forest.textures[m.base_color_texture.unwrap().0];
         let share =
             texture.rgba.iter().filter(|p| p[3] < 128).count() as f64 / texture.rgba.len() as f64;
-        assert!(
-            (0.1..0.95).contains(&share),
-            "{}: {share} of it is clear",
-            m.name
-        );
+        assert!((0.1..0.95).contains(&share), "{}: {share} of it is clear", m.name);
     }
 }
 
@@ -124,28 +96,15 @@ fn instances_share_their_meshes() {
 fn the_barn_brings_its_own_light() {
     let barn = scene("lattice/barn_skylight.glb");
     assert_eq!(barn.lights.len(), 1);
-    let down = barn.lights[0]
-        .light
-        .unwrap()
-        .direction_to_light(glam::DVec3::ZERO);
-    assert!(
-        (down - glam::DVec3::new(0.5444, 0.8377, -0.0441)).length() < 1e-3,
-        "{down}"
-    );
+    let down = barn.lights[0].light.unwrap().direction_to_light(glam::DVec3::ZERO);
+    assert!((down - glam::DVec3::new(0.5444, 0.8377, -0.0441)).length() < 1e-3, "{down}");
 }
 
 #[test]
 fn figures_stand_in_their_bind_pose() {
     // CesiumMan's joints turn him upright: 1.5 m tall and narrow from side to side of his walk.
     let man = scene("characters/CesiumMan.glb").bounds();
-    assert!(
-        man.min.y.abs() < 0.02 && (man.max.y - 1.507).abs() < 0.01,
-        "{man:?}"
-    );
+    assert!(man.min.y.abs() < 0.02 && (man.max.y - 1.507).abs() < 0.01, "{man:?}");
     let fox = scene("characters/Fox.glb");
-    assert!(
-        fox.notices.iter().any(|n| n.0.contains("no normals")),
-        "{:?}",
-        fox.notices
-    );
+    assert!(fox.notices.iter().any(|n| n.0.contains("no normals")), "{:?}", fox.notices);
 }

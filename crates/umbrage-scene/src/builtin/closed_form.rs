@@ -85,12 +85,7 @@ pub(super) fn pole(size: u32) -> Scene {
     let top = Vec3::new(half, POLE_HEIGHT as f32, half);
     b.cuboid(Vec3::new(-half, 0.0, -half), top, size);
     stage.set(b, paint);
-    stage.camera(
-        "side",
-        DVec3::new(-3.0, 3.2, 8.5),
-        DVec3::new(1.3, 0.9, 0.0),
-        CLOSE_UP,
-    );
+    stage.camera("side", DVec3::new(-3.0, 3.2, 8.5), DVec3::new(1.3, 0.9, 0.0), CLOSE_UP);
     stage.sun(DVec3::new(1.0, -1.0, 0.5));
     stage.finish()
 }
@@ -103,24 +98,14 @@ pub(super) fn slit(size: u32) -> Scene {
     let (screen, height) = (SCREEN_HALF as f32, SCREEN_HEIGHT as f32);
     let (width, length) = (SLIT_HALF_WIDTH as f32, SLIT_HALF_LENGTH as f32);
     let mut piece = |x0: f32, x1: f32, z0: f32, z1: f32| {
-        b.sheet(
-            Vec3::new(x0, height, z0),
-            Vec3::Z * (z1 - z0),
-            Vec3::X * (x1 - x0),
-            size,
-        );
+        b.sheet(Vec3::new(x0, height, z0), Vec3::Z * (z1 - z0), Vec3::X * (x1 - x0), size);
     };
     piece(-screen, -width, -screen, screen);
     piece(width, screen, -screen, screen);
     piece(-width, width, -screen, -length);
     piece(-width, width, length, screen);
     stage.set(b, paint);
-    stage.camera(
-        "side",
-        DVec3::new(9.0, 3.6, 11.0),
-        DVec3::new(1.5, 0.3, 0.0),
-        CLOSE_UP,
-    );
+    stage.camera("side", DVec3::new(9.0, 3.6, 11.0), DVec3::new(1.5, 0.3, 0.0), CLOSE_UP);
     stage.sun(DVec3::new(1.0, -1.0, 0.25));
     stage.finish()
 }
@@ -132,21 +117,12 @@ pub(super) fn sphere(size: u32) -> Scene {
     let mut b = MeshBuilder::new();
     b.ball(SPHERE_CENTER.as_vec3(), SPHERE_RADIUS as f32, size);
     stage.set(b, paint);
-    stage.camera(
-        "side",
-        DVec3::new(-2.5, 3.4, 7.5),
-        DVec3::new(0.8, 1.0, 0.0),
-        CLOSE_UP,
-    );
+    stage.camera("side", DVec3::new(-2.5, 3.4, 7.5), DVec3::new(0.8, 1.0, 0.0), CLOSE_UP);
     stage.sun(DVec3::new(1.0, -1.25, 0.4));
     stage.finish()
 }
 
-const CLOSE_UP: Lens = Lens {
-    fov_y_deg: 45.0,
-    near: 0.5,
-    far: 60.0,
-};
+const CLOSE_UP: Lens = Lens { fov_y_deg: 45.0, near: 0.5, far: 60.0 };
 
 fn plane(name: &str, cells: u32) -> Stage {
     let mut stage = Stage::new(name);

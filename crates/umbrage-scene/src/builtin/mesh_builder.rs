@@ -14,10 +14,7 @@ impl MeshBuilder {
     }
 
     pub(super) fn finish(self, material: usize) -> Mesh {
-        Mesh {
-            material,
-            ..self.mesh
-        }
+        Mesh { material, ..self.mesh }
     }
 
     /// A copy of `other`, moved. Mirroring transforms keep the outside outside.
@@ -33,20 +30,11 @@ impl MeshBuilder {
             m.x_axis.cross(m.y_axis),
         ) * sign;
         let to = &mut self.mesh;
-        to.positions.extend(
-            from.positions
-                .iter()
-                .map(|&p| self_from_other.transform_point3(p)),
-        );
-        to.normals
-            .extend(from.normals.iter().map(|&n| (cofactor * n).normalize()));
+        to.positions.extend(from.positions.iter().map(|&p| self_from_other.transform_point3(p)));
+        to.normals.extend(from.normals.iter().map(|&n| (cofactor * n).normalize()));
         to.uvs.extend(&from.uvs);
         to.triangles.extend(from.triangles.iter().map(|&[a, b, c]| {
-            if mirrored {
-                [a, c, b].map(|i| i + base)
-            } else {
-                [a, b, c].map(|i| i + base)
-            }
+            if mirrored { [a, c, b].map(|i| i + base) } else { [a, b, c].map(|i| i + base) }
         }));
         self
     }
@@ -156,9 +144,7 @@ impl MeshBuilder {
 
     /// A flat convex polygon, counter-clockwise seen from the front.
     pub(super) fn polygon(&mut self, corners: &[Vec3]) -> &mut Self {
-        let normal = (corners[1] - corners[0])
-            .cross(corners[2] - corners[0])
-            .normalize();
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let base = self.mesh.positions.len() as u32;
         for (i, &p) in corners.iter().enumerate() {
             self.vertex(p, normal, Vec2::new(i.min(1) as f32, (i / 2).min(1) as f32));

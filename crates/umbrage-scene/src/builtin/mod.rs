@@ -66,18 +66,11 @@ pub fn builtin(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
     let Some(info) = BUILTINS.iter().find(|b| b.name == name) else {
         let distance = |b: &&BuiltinInfo| strsim::damerau_levenshtein(b.name, name);
         let nearest = BUILTINS.iter().min_by_key(distance).map_or("", |b| b.name);
-        return Err(SceneError::UnknownBuiltin {
-            name: name.into(),
-            nearest,
-        });
+        return Err(SceneError::UnknownBuiltin { name: name.into(), nearest });
     };
     let size = size.unwrap_or(info.default_size);
     if !(1..=info.max_size).contains(&size) {
-        return Err(SceneError::BuiltinSize {
-            name: info.name,
-            size,
-            max: info.max_size,
-        });
+        return Err(SceneError::BuiltinSize { name: info.name, size, max: info.max_size });
     }
     Ok((info.build)(size))
 }

@@ -20,12 +20,7 @@ pub(super) struct Shape(usize);
 
 impl Stage {
     pub(super) fn new(name: &str) -> Self {
-        Self {
-            scene: Scene {
-                name: name.into(),
-                ..Scene::default()
-            },
-        }
+        Self { scene: Scene { name: name.into(), ..Scene::default() } }
     }
 
     pub(super) fn finish(self) -> Scene {
@@ -66,10 +61,7 @@ impl Stage {
     }
 
     pub(super) fn place(&mut self, shape: Shape, world_from_mesh: DAffine3) {
-        self.scene.instances.push(Instance {
-            mesh: shape.0,
-            world_from_mesh,
-        });
+        self.scene.instances.push(Instance { mesh: shape.0, world_from_mesh });
     }
 
     /// A shape that stands just once, where it was built.
@@ -102,9 +94,7 @@ impl Stage {
     pub(super) fn sun(&mut self, direction: DVec3) {
         self.scene.lights.push(SceneLight {
             name: "sun".into(),
-            light: Some(Light::Directional {
-                direction: direction.normalize(),
-            }),
+            light: Some(Light::Directional { direction: direction.normalize() }),
             color: Vec3::new(1.0, 0.93, 0.82),
             intensity: 100_000.0,
         });

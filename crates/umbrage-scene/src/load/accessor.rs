@@ -21,11 +21,7 @@ impl Document<'_> {
         let normalized = self.get(id, place)?.normalized;
         self.read(id, place, |component, bytes| {
             let scale = |value: f32, max: f32| {
-                if normalized {
-                    (value / max).max(-1.0)
-                } else {
-                    value
-                }
+                if normalized { (value / max).max(-1.0) } else { value }
             };
             match component {
                 ComponentType::F32 => f32::from_le_bytes(fixed(bytes)),
@@ -47,10 +43,7 @@ impl Document<'_> {
         let Checked::Valid(component) = self.get(id, place)?.component_type else {
             return Err(self.invalid(place, "componentType is unknown"));
         };
-        if !matches!(
-            component.0,
-            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
-        ) {
+        if !matches!(component.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
             return Err(self.invalid(place, "must be unsigned integers"));
         }
         self.read(id, place, |component, bytes| unsigned(component, bytes))
@@ -105,13 +98,8 @@ impl Document<'_> {
             let index_type = index_type.0;
             let (at, from) = (&sparse.indices, &sparse.values);
             let n = sparse.count.0;
-            let indices = self.elements(
-                at.buffer_view,
-                at.byte_offset.0,
-                n,
-                index_type.size(),
-                &place,
-            )?;
+            let indices =
+                self.elements(at.buffer_view, at.byte_offset.0, n, index_type.size(), &place)?;
             let new = self.elements(from.buffer_view, from.byte_offset.0, n, element, &place)?;
             for (index, bytes) in indices.zip(new) {
                 let index = unsigned(index_type, index) as usize;

@@ -31,9 +31,7 @@ impl<'a> Document<'a> {
             None => (Cow::Borrowed(bytes), None),
             Some(rest) => {
                 // The length field: the crate trusts it to be at least the header's own.
-                let length = rest
-                    .get(4..8)
-                    .map(|b| u32::from_le_bytes(b.try_into().unwrap()));
+                let length = rest.get(4..8).map(|b| u32::from_le_bytes(b.try_into().unwrap()));
                 match length {
                     None => return Err(fail("header", "the file ends within it".into())),
                     Some(n) if n < 20 || n as usize > bytes.len() => {
@@ -52,11 +50,7 @@ impl<'a> Document<'a> {
         };
         let root: Root = gltf::json::deserialize::from_slice(&json)
             .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
-        let mut document = Self {
-            path,
-            root,
-            buffers: Vec::new(),
-        };
+        let mut document = Self { path, root, buffers: Vec::new() };
         document.check_asset()?;
         document.buffers = document.load_buffers(blob)?;
         Ok(document)
@@ -133,29 +127,22 @@ impl<'a> Document<'a> {
     ) -> Result<&[u8], SceneError> {
         let view = self.get(index, place)?;
         let buffer = self.buffers.get(view.buffer.value()).ok_or_else(|| {
-            self.invalid(
-                place,
-                format!("there is no buffers[{}]", view.buffer.value()),
-            )
+            self.invalid(place, format!("there is no buffers[{}]", view.buffer.value()))
         })?;
         let start = view.byte_offset.map_or(0, |o| o.0);
-        let range = usize::try_from(start).ok().zip(
-            start
-                .checked_add(view.byte_length.0)
-                .and_then(|end| usize::try_from(end).ok()),
-        );
-        range
-            .and_then(|(start, end)| buffer.get(start..end))
-            .ok_or_else(|| {
-                self.invalid(
-                    &format!("bufferViews[{}]", index.value()),
-                    format!(
-                        "{} bytes from {start} on do not fit into the buffer's {}",
-                        view.byte_length.0,
-                        buffer.len()
-                    ),
-                )
-            })
+        let range = usize::try_from(start)
+            .ok()
+            .zip(start.checked_add(view.byte_length.0).and_then(|end| usize::try_from(end).ok()));
+        range.and_then(|(start, end)| buffer.get(start..end)).ok_or_else(|| {
+            self.invalid(
+                &format!("bufferViews[{}]", index.value()),
+                format!(
+                    "{} bytes from {start} on do not fit into the buffer's {}",
+                    view.byte_length.0,
+                    buffer.len()
+                ),
+            )
+        })
     }
 
     /// What an index found at `place` points to.
@@ -168,11 +155,7 @@ impl<'a> Document<'a> {
     }
 
     pub(super) fn invalid(&self, place: &str, problem: impl Into<String>) -> SceneError {
-        SceneError::Invalid {
-            path: self.path.into(),
-            place: place.into(),
-            problem: problem.into(),
-        }
+        SceneError::Invalid { path: self.path.into(), place: place.into(), problem: problem.into() }
     }
 }
 
@@ -189,10 +172,7 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
         file.take(metadata.len()).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
-    read().map_err(|source| SceneError::Read {
-        path: path.into(),
-        source,
-    })
+    read().map_err(|source| SceneError::Read { path: path.into(), source })
 }
 
 /// Repairs, those of one kind collected into one sentence.
@@ -230,12 +210,7 @@ impl Notices {
             }
             None => {
                 let first = place.to_string();
-                self.entries.push(Entry {
-                    what,
-                    first,
-                    places: 1,
-                    items,
-                });
+                self.entries.push(Entry { what, first, places: 1, items });
             }
         }
     }
@@ -246,11 +221,7 @@ impl Notices {
                 1 => String::new(),
                 n => format!(" and {} more", n - 1),
             };
-            let items = if e.items > 0 {
-                format!("{} ", e.items)
-            } else {
-                String::new()
-            };
+            let items = if e.items > 0 { format!("{} ", e.items) } else { String::new() };
             Notice(format!("{}{others}: {items}{}", e.first, e.what))
         };
         self.entries.into_iter().map(sentence).collect()

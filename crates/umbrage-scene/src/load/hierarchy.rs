@@ -69,10 +69,7 @@ impl Hierarchy {
                 open[first..].reverse();
             }
         }
-        Ok(Self {
-            world_from_node,
-            shown,
-        })
+        Ok(Self { world_from_node, shown })
     }
 }
 
@@ -94,9 +91,7 @@ fn local(document: &Document, i: usize) -> Result<DAffine3, SceneError> {
         |v: Option<[f32; 3]>, default| v.map_or(default, |v| DVec3::from(v.map(f64::from)));
     let translation = vector(node.translation, DVec3::ZERO);
     let scale = vector(node.scale, DVec3::ONE);
-    let rotation = node
-        .rotation
-        .map_or(DQuat::IDENTITY, |q| DQuat::from_array(q.0.map(f64::from)));
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, |q| DQuat::from_array(q.0.map(f64::from)));
     if !translation.is_finite() {
         return fail("translation", "is not finite");
     }
@@ -106,9 +101,5 @@ fn local(document: &Document, i: usize) -> Result<DAffine3, SceneError> {
     if !(rotation.is_finite() && rotation.length() > 1e-6) {
         return fail("rotation", "is no rotation: it must be a unit quaternion");
     }
-    Ok(DAffine3::from_scale_rotation_translation(
-        scale,
-        rotation.normalize(),
-        translation,
-    ))
+    Ok(DAffine3::from_scale_rotation_translation(scale, rotation.normalize(), translation))
 }

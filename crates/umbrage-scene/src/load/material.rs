@@ -76,14 +76,10 @@ impl Materials {
         }
         let alpha = match mode {
             AlphaMode::Opaque => Alpha::Opaque,
-            AlphaMode::Mask => Alpha::Mask {
-                cutoff: cutoff.clamp(0.0, 1.0),
-            },
+            AlphaMode::Mask => Alpha::Mask { cutoff: cutoff.clamp(0.0, 1.0) },
             AlphaMode::Blend => {
-                notices.add(
-                    &place,
-                    "is translucent: solid where alpha is at least 0.5, else absent",
-                );
+                notices
+                    .add(&place, "is translucent: solid where alpha is at least 0.5, else absent");
                 Alpha::Mask { cutoff: 0.5 }
             }
         };
@@ -147,10 +143,7 @@ impl Materials {
                 Some(TextureId(self.textures.len() - 1))
             }
             Err(problem) => {
-                notices.add(
-                    &place,
-                    format!("left out, its materials are plain: {problem}"),
-                );
+                notices.add(&place, format!("left out, its materials are plain: {problem}"));
                 None
             }
         };
@@ -170,15 +163,9 @@ fn plain(name: &str, base_color: Vec4) -> Material {
 }
 
 fn tex_coords(info: &Info) -> TexCoords {
-    let extension = info
-        .extensions
-        .as_ref()
-        .and_then(|e| e.texture_transform.as_ref());
+    let extension = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
     let Some(t) = extension else {
-        return TexCoords {
-            set: info.tex_coord,
-            transform: Affine2::IDENTITY,
-        };
+        return TexCoords { set: info.tex_coord, transform: Affine2::IDENTITY };
     };
     // The rotation is counter-clockwise as seen with v running down.
     let [scale, offset] = [t.scale.0, t.offset.0].map(Vec2::from);
@@ -189,9 +176,8 @@ fn tex_coords(info: &Info) -> TexCoords {
 }
 
 fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|e| e.to_string())?;
+    let mut reader =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
         return Err("is neither PNG nor JPEG".into());
     }

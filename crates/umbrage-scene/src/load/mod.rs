@@ -50,11 +50,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         materials: Materials::default(),
         loaded: HashMap::new(),
         scene: Scene {
-            name: path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             ..Scene::default()
         },
         notices: Notices::default(),
@@ -107,14 +103,10 @@ impl Loader<'_> {
         for node_from_copy in self.copies(node, &place)? {
             let world_from_mesh = world_from_node * node_from_copy;
             if is_flat(world_from_mesh.matrix3) {
-                self.notices
-                    .add(&place, "its transform flattens its mesh, left out");
+                self.notices.add(&place, "its transform flattens its mesh, left out");
                 continue;
             }
-            let place = |&mesh: &usize| Instance {
-                mesh,
-                world_from_mesh,
-            };
+            let place = |&mesh: &usize| Instance { mesh, world_from_mesh };
             self.scene.instances.extend(meshes.iter().map(place));
         }
         Ok(())
@@ -132,21 +124,15 @@ impl Loader<'_> {
             let world_from_mesh = match primitive::load_binding(document, json, place)? {
                 Some(b) => skin::pose(document, mesh, &b, joints, place, &mut this.notices)?,
                 None => {
-                    this.notices
-                        .add(place, "has a skin but no joints, shown where it was made");
+                    this.notices.add(place, "has a skin but no joints, shown where it was made");
                     DAffine3::IDENTITY
                 }
             };
             origins.push(world_from_mesh);
             Ok(())
         })?;
-        let place = |(mesh, world_from_mesh)| Instance {
-            mesh,
-            world_from_mesh,
-        };
-        self.scene
-            .instances
-            .extend(made.into_iter().zip(origins).map(place));
+        let place = |(mesh, world_from_mesh)| Instance { mesh, world_from_mesh };
+        self.scene.instances.extend(made.into_iter().zip(origins).map(place));
         Ok(())
     }
 
@@ -166,16 +152,9 @@ impl Loader<'_> {
         for (i, primitive) in json.primitives.iter().enumerate() {
             let place = format!("meshes[{}].primitives[{i}]", mesh.value());
             let (material, coords) =
-                self.materials
-                    .load(document, primitive.material, &place, &mut self.notices)?;
-            let loaded = primitive::load(
-                document,
-                primitive,
-                &place,
-                material,
-                coords,
-                &mut self.notices,
-            )?;
+                self.materials.load(document, primitive.material, &place, &mut self.notices)?;
+            let loaded =
+                primitive::load(document, primitive, &place, material, coords, &mut self.notices)?;
             if let Some(mut loaded) = loaded {
                 finish(self, &mut loaded, (primitive, &place))?;
                 made.push(self.scene.meshes.len());
@@ -188,29 +167,19 @@ impl Loader<'_> {
     /// Where a node draws its mesh, in the node's space: once where it stands, or wherever
     /// `EXT_mesh_gpu_instancing` says.
     fn copies(&self, node: &Node, place: &str) -> Result<Vec<DAffine3>, SceneError> {
-        let extension = node
-            .extensions
-            .as_ref()
-            .and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
+        let extension =
+            node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
         let Some(attributes) = extension.map(|e| &e["attributes"]) else {
             return Ok(vec![DAffine3::IDENTITY]);
         };
         let place = format!("{place}.extensions.EXT_mesh_gpu_instancing");
         let id = |name: &str| {
-            attributes[name]
-                .as_u64()
-                .and_then(|i| u32::try_from(i).ok())
-                .map(Index::new)
+            attributes[name].as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new)
         };
-        let vectors = |name: &str| {
-            id(name)
-                .map(|i| self.document.floats::<3>(i, &place))
-                .transpose()
-        };
+        let vectors =
+            |name: &str| id(name).map(|i| self.document.floats::<3>(i, &place)).transpose();
         let (translations, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
-        let rotations = id("ROTATION")
-            .map(|i| self.document.floats::<4>(i, &place))
-            .transpose()?;
+        let rotations = id("ROTATION").map(|i| self.document.floats::<4>(i, &place)).transpose()?;
         let counts = [
             translations.as_ref().map(Vec::len),
             scales.as_ref().map(Vec::len),
@@ -218,14 +187,10 @@ impl Loader<'_> {
         ];
         let n = counts.into_iter().flatten().next().unwrap_or(0);
         if counts.into_iter().flatten().any(|other| other != n) {
-            return Err(self
-                .document
-                .invalid(&place, "its attributes differ in number"));
+            return Err(self.document.invalid(&place, "its attributes differ in number"));
         }
         let vector = |values: &Option<Vec<[f32; 3]>>, i: usize, default| {
-            values
-                .as_ref()
-                .map_or(default, |v| DVec3::from(v[i].map(f64::from)))
+            values.as_ref().map_or(default, |v| DVec3::from(v[i].map(f64::from)))
         };
         let copy = |i: usize| {
             let rotation = rotations
@@ -239,9 +204,7 @@ impl Loader<'_> {
             );
             match t.is_finite() {
                 true => Ok(t),
-                false => Err(self
-                    .document
-                    .invalid(&place, format!("instance {i} is nowhere"))),
+                false => Err(self.document.invalid(&place, format!("instance {i} is nowhere"))),
             }
         };
         (0..n).map(copy).collect()
@@ -251,9 +214,7 @@ impl Loader<'_> {
     fn check_drawn(&self) -> Result<Aabb, SceneError> {
         let bounds = self.scene.bounds();
         if self.scene.drawn_triangles() == 0 {
-            return Err(self
-                .document
-                .invalid("scene", "there are no triangles to draw"));
+            return Err(self.document.invalid("scene", "there are no triangles to draw"));
         }
         let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
         if !(reach <= WORLD_END) {
@@ -273,10 +234,7 @@ impl Loader<'_> {
                 onlookers::load_camera(self.document, camera, name, world, bounds, notices)?;
             self.scene.cameras.extend(camera);
         }
-        let light = node
-            .extensions
-            .as_ref()
-            .and_then(|e| e.khr_lights_punctual.as_ref());
+        let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         if let Some(light) = light {
             let (index, notices) = (light.light.value(), &mut self.notices);
             let light = onlookers::load_light(self.document, index, name, world, bounds, notices)?;

@@ -48,12 +48,7 @@ pub(super) fn load_camera(
         return Ok(None);
     }
     Ok(Some(SceneCamera {
-        name: json
-            .name
-            .as_deref()
-            .or(node_name)
-            .unwrap_or_default()
-            .into(),
+        name: json.name.as_deref().or(node_name).unwrap_or_default().into(),
         eye,
         // As far away as the view is long: the direction survives rounding anywhere.
         target: eye + forward * far,
@@ -74,11 +69,7 @@ pub(super) fn load_light(
     notices: &mut Notices,
 ) -> Result<Option<SceneLight>, SceneError> {
     let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
-    let lights = document
-        .root
-        .extensions
-        .as_ref()
-        .and_then(|e| e.khr_lights_punctual.as_ref());
+    let lights = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
     let Some(json) = lights.and_then(|l| l.lights.get(index)) else {
         return Err(document.invalid(&place, "does not exist, but a node shines with it"));
     };
@@ -126,28 +117,14 @@ pub(super) fn load_light(
     let color = color.max(Vec3::ZERO);
     let brightest = color.max_element();
     Ok(Some(SceneLight {
-        name: json
-            .name
-            .as_deref()
-            .or(node_name)
-            .unwrap_or_default()
-            .into(),
+        name: json.name.as_deref().or(node_name).unwrap_or_default().into(),
         light,
-        color: if brightest > 0.0 {
-            color / brightest
-        } else {
-            Vec3::ONE
-        },
+        color: if brightest > 0.0 { color / brightest } else { Vec3::ONE },
         intensity: (json.intensity * brightest).max(0.0),
     }))
 }
 
 /// The largest value that `distance` has in a box, a little rounded up.
 fn farthest(bounds: Aabb, distance: impl Fn(DVec3) -> f64) -> f64 {
-    bounds
-        .corners()
-        .into_iter()
-        .map(distance)
-        .fold(0.0, f64::max)
-        * 1.01
+    bounds.corners().into_iter().map(distance).fold(0.0, f64::max) * 1.01
 }

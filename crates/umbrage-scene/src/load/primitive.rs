@@ -36,10 +36,7 @@ pub(super) fn load(
     let Checked::Valid(mode) = primitive.mode else {
         return Err(document.invalid(place, "mode is unknown, should be 0 to 6"));
     };
-    if matches!(
-        mode,
-        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
-    ) {
+    if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
         notices.add(place, "points and lines are left out");
         return Ok(None);
     }
@@ -62,10 +59,7 @@ pub(super) fn load(
     };
     let triangles = triangles(mode, &indices);
     if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        notices.add(
-            place,
-            "the last triangle has less than three corners, left out",
-        );
+        notices.add(place, "the last triangle has less than three corners, left out");
     }
     if let Some(k) = indices.iter().position(|&i| i as usize >= positions.len()) {
         let (i, n) = (indices[k], positions.len());
@@ -85,10 +79,7 @@ pub(super) fn load(
         None => Vec::new(),
     };
     let n = positions.len();
-    for (what, found) in [
-        ("normals", normals.len()),
-        ("texture coordinates", uvs.len()),
-    ] {
+    for (what, found) in [("normals", normals.len()), ("texture coordinates", uvs.len())] {
         if found != n && found != 0 {
             return Err(document.invalid(place, format!("has {n} positions but {found} {what}")));
         }
@@ -97,13 +88,7 @@ pub(super) fn load(
         notices.add(place, "vertex colours are not shown");
     }
 
-    let mut mesh = Mesh {
-        positions,
-        normals,
-        uvs,
-        triangles,
-        material,
-    };
+    let mut mesh = Mesh { positions, normals, uvs, triangles, material };
     if mesh.normals.is_empty() {
         notices.add(place, "has no normals, shaded flat");
         shade_flat(&mut mesh);
@@ -127,10 +112,7 @@ fn load_uvs(
     notices: &mut Notices,
 ) -> Result<Vec<Vec2>, SceneError> {
     let Some(id) = attribute(primitive, Semantic::TexCoords(coords.set)) else {
-        notices.add(
-            place,
-            "has a texture but no coordinates for it, shown without",
-        );
+        notices.add(place, "has a texture but no coordinates for it, shown without");
         return Ok(Vec::new());
     };
     let place = format!("{place}.attributes.TEXCOORD_{}", coords.set);
@@ -141,11 +123,7 @@ fn load_uvs(
         if uv.is_finite() { uv } else { Vec2::ZERO }
     });
     let uvs = uvs.collect();
-    notices.add_some(
-        place,
-        broken,
-        "texture coordinates are not finite, 0 instead",
-    );
+    notices.add_some(place, broken, "texture coordinates are not finite, 0 instead");
     Ok(uvs)
 }
 
@@ -166,11 +144,7 @@ pub(super) fn load_binding(
 }
 
 fn vectors(document: &Document, id: Index<Accessor>, place: &str) -> Result<Vec<Vec3>, SceneError> {
-    Ok(document
-        .floats::<3>(id, place)?
-        .into_iter()
-        .map(Vec3::from)
-        .collect())
+    Ok(document.floats::<3>(id, place)?.into_iter().map(Vec3::from).collect())
 }
 
 /// Corners of each triangle, all with the same winding.
@@ -180,23 +154,10 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
             .windows(3)
             .enumerate()
             // Every second triangle of a strip runs the other way round.
-            .map(|(i, w)| {
-                if i % 2 == 0 {
-                    [w[0], w[1], w[2]]
-                } else {
-                    [w[0], w[2], w[1]]
-                }
-            })
+            .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
             .collect(),
-        Mode::TriangleFan => indices
-            .windows(2)
-            .skip(1)
-            .map(|w| [indices[0], w[0], w[1]])
-            .collect(),
-        _ => indices
-            .chunks_exact(3)
-            .map(|c| [c[0], c[1], c[2]])
-            .collect(),
+        Mode::TriangleFan => indices.windows(2).skip(1).map(|w| [indices[0], w[0], w[1]]).collect(),
+        _ => indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
     }
 }
 

@@ -20,18 +20,14 @@ pub(super) fn joint_matrices(
     };
     if inverse_binds.len() < json.joints.len() {
         let (m, j) = (inverse_binds.len(), json.joints.len());
-        return Err(document.invalid(
-            &place,
-            format!("has {m} inverse bind matrices for {j} joints"),
-        ));
+        return Err(
+            document.invalid(&place, format!("has {m} inverse bind matrices for {j} joints"))
+        );
     }
     let joint = |(joint, inverse_bind): (&Index<_>, [f32; 16])| {
-        let world = hierarchy
-            .world_from_node
-            .get(joint.value())
-            .ok_or_else(|| {
-                document.invalid(&place, format!("there is no nodes[{}]", joint.value()))
-            })?;
+        let world = hierarchy.world_from_node.get(joint.value()).ok_or_else(|| {
+            document.invalid(&place, format!("there is no nodes[{}]", joint.value()))
+        })?;
         let inverse_bind = DMat4::from_cols_array(&inverse_bind.map(f64::from));
         let matrix = *world * DAffine3::from_mat4(inverse_bind);
         match matrix.is_finite() {
@@ -98,10 +94,6 @@ pub(super) fn pose(
         let normal = mesh.normals[i].as_dvec3();
         mesh.normals[i] = (cofactor * normal).normalize_or(normal).as_vec3();
     }
-    notices.add_some(
-        place,
-        unbound,
-        "vertices hang on no joint, moved with the first",
-    );
+    notices.add_some(place, unbound, "vertices hang on no joint, moved with the first");
     Ok(DAffine3::from_translation(origin))
 }

@@ -14,19 +14,12 @@ pub(super) fn decode_data(data: &str) -> Result<Vec<u8>, String> {
 
 /// Where a relative, percent-encoded URI leads, if that is a place below `folder`.
 pub(super) fn file_below(folder: &Path, uri: &str) -> Result<PathBuf, String> {
-    let refuse = |why: &str| {
-        Err(format!(
-            "uri {uri:?} {why}; only files below the scene's folder are read"
-        ))
-    };
+    let refuse =
+        |why: &str| Err(format!("uri {uri:?} {why}; only files below the scene's folder are read"));
     let Ok(relative) = percent_encoding::percent_decode_str(uri).decode_utf8() else {
         return refuse("is not UTF-8");
     };
-    if relative
-        .split(['/', '\\'])
-        .next()
-        .is_some_and(|first| first.contains(':'))
-    {
+    if relative.split(['/', '\\']).next().is_some_and(|first| first.contains(':')) {
         return refuse("has a scheme or a drive");
     }
     let relative = Path::new(&*relative);
@@ -54,13 +47,7 @@ mod tests {
     fn data_uris_decode_or_say_why_not() {
         let good = "application/octet-stream;base64,AAEC/w==";
         assert_eq!(decode_data(good), Ok(vec![0, 1, 2, 255]));
-        for bad in [
-            "",
-            "text/plain,hello",
-            ";base64",
-            ";base64,*",
-            "application/x;base64,AAE",
-        ] {
+        for bad in ["", "text/plain,hello", ";base64", ";base64,*", "application/x;base64,AAE"] {
             assert!(decode_data(bad).is_err(), "{bad}");
         }
     }

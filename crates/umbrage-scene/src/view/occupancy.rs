@@ -40,9 +40,7 @@ impl Occupancy {
     pub(super) fn of(scene: &Scene, bounds: Aabb) -> Self {
         let extent = bounds.size();
         let longest = extent.max_element().max(1e-9);
-        let size = (extent * (CELLS / longest))
-            .ceil()
-            .max(DVec3::splat(MIN_CELLS));
+        let size = (extent * (CELLS / longest)).ceil().max(DVec3::splat(MIN_CELLS));
         // A box without thickness still has cells.
         let cell = extent.max(DVec3::splat(longest * 1e-6)) / size;
         let size = size.as_usizevec3();
@@ -56,15 +54,8 @@ impl Occupancy {
         let drawn = scene.drawn_triangles();
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh];
-            let double_sided = scene
-                .materials
-                .get(mesh.material)
-                .is_some_and(|m| m.double_sided);
-            let step = if mesh.triangles.len() < 1000 {
-                1
-            } else {
-                drawn.div_ceil(MAX_TRIANGLES)
-            };
+            let double_sided = scene.materials.get(mesh.material).is_some_and(|m| m.double_sided);
+            let step = if mesh.triangles.len() < 1000 { 1 } else { drawn.div_ceil(MAX_TRIANGLES) };
             grid.add(mesh, instance.world_from_mesh, double_sided, step as usize);
         }
         for z in 0..size.z {
@@ -101,9 +92,7 @@ impl Occupancy {
     /// Marks the cells of a triangle given in cells, by points closer than a cell.
     fn fill(&mut self, [a, b, c]: [Vec3; 3], facing: Facing) {
         let edges = [b - a, c - b, a - c].map(|e| e.abs().max_element());
-        let n = (edges.into_iter().fold(0.0, f32::max) * 1.5)
-            .ceil()
-            .clamp(1.0, 400.0) as u32;
+        let n = (edges.into_iter().fold(0.0, f32::max) * 1.5).ceil().clamp(1.0, 400.0) as u32;
         let last = self.size - USizeVec3::ONE;
         for i in 0..=n {
             for j in 0..=n - i {
@@ -124,6 +113,11 @@ impl Occupancy {
         let c = (p - self.bounds.min) / self.cell;
         let inside = c.cmpge(DVec3::ZERO).all() && c.cmplt(self.size.as_dvec3()).all();
         inside.then(|| c.as_usizevec3())
+    }
+
+    /// The longest edge of the box, metres.
+    pub(super) fn longest(&self) -> f64 {
+        (self.size.as_dvec3() * self.cell).max_element()
     }
 
     /// Whether there is nothing in a point's cell and those beside it.
@@ -173,15 +167,49 @@ impl Occupancy {
                 let at = |x: usize, y: usize, z: usize| {
                     self.bounds.min + USizeVec3::new(x, y, z).as_dvec3() * self.cell
                 };
-                around = around.union(Aabb {
-                    min: at(x, floor, z),
-                    max: at(x + 1, top + 1, z + 1),
-                });
+                around =
+                    around.union(Aabb { min: at(x, floor, z), max: at(x + 1, top + 1, z + 1) });
             }
         }
         heights.sort_by(f64::total_cmp);
         let typical = heights.get(heights.len() * 3 / 4)?;
         Some((around, *typical))
+    }
+
+    /// Centres of the outermost cells in a box: those with nothing before or behind them along any
+    /// axis. The box's centre if all is empty.
+    pub(super) fn points_in(&self, within: Aabb) -> Vec<DVec3> {
+        let USizeVec3 { x: nx, y: ny, z: nz } = self.size;
+        let is_free = |x: usize, y: usize, z: usize| {
+            x >= nx || y >= ny || z >= nz || self.cells[self.index(x, y, z)] == 0
+        };
+        let mut points = Vec::new();
+        for z in 0..nz {
+            for y in 0..ny {
+                for x in 0..nx {
+                    // Wraps at the box's faces, and counts as free there.
+                    let [x0, y0, z0] = [x, y, z].map(|i| i.wrapping_sub(1));
+                    let outermost = is_free(x0, y, z)
+                        || is_free(x + 1, y, z)
+                        || is_free(x, y0, z)
+                        || is_free(x, y + 1, z)
+                        || is_free(x, y, z0)
+                        || is_free(x, y, z + 1);
+                    if is_free(x, y, z) || !outermost {
+                        continue;
+                    }
+                    let p = USizeVec3::new(x, y, z).as_dvec3() + 0.5;
+                    let p = self.bounds.min + p * self.cell;
+                    if p.cmpge(within.min).all() && p.cmple(within.max).all() {
+                        points.push(p);
+                    }
+                }
+            }
+        }
+        if points.is_empty() {
+            points.push(within.center());
+        }
+        points
     }
 
     /// What is first seen from `eye` along `direction`, beyond the eye's own cell.
@@ -213,17 +241,11 @@ impl Occupancy {
             let cell = self.index(at.x as usize, at.y as usize, at.z as usize);
             let facing = self.cells[cell];
             if facing != 0 && !is_own {
-                return Some(Sight {
-                    distance,
-                    cell,
-                    facing,
-                });
+                return Some(Sight { distance, cell, facing });
             }
             is_own = false;
             // NaN (a direction along a cell's face) loses against any number.
-            let axis = (0..3)
-                .min_by(|&i, &j| next[i].total_cmp(&next[j]))
-                .unwrap_or(0);
+            let axis = (0..3).min_by(|&i, &j| next[i].total_cmp(&next[j])).unwrap_or(0);
             distance = next[axis];
             if !distance.is_finite() {
                 return None;
