@@ -110,11 +110,10 @@
 
   // Magnifier ---------------------------------------------------------------------------------
 
-  /** Width and height of what a tile shows, pixels of the picture. */
+  /** Width and height of what a tile shows, pixels of the picture: 4:3 like the tile, if they fit. */
   function region() {
-    const box = tiles[0].firstElementChild.getBoundingClientRect();
-    const w = Math.max(4, Math.min(width, Math.round(box.width / state.zoom)));
-    return [w, Math.max(3, Math.min(height, Math.round(w * 0.75)))];
+    const fourths = Math.max(1, Math.round(tiles[0].firstElementChild.clientWidth / state.zoom / 4));
+    return [Math.min(width, fourths * 4), Math.min(height, fourths * 3)];
   }
 
   function placeAt(event) {
@@ -156,12 +155,11 @@
   }
 
   reticle.addEventListener("keydown", (event) => {
-    const [w, h] = region(), step = event.shiftKey ? 1 : 1 / 8;
-    const move = { ArrowLeft: [-w, 0], ArrowRight: [w, 0], ArrowUp: [0, -h], ArrowDown: [0, h] }[event.key];
-    if (!move) return;
+    const direction = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    if (!direction) return;
     event.preventDefault();
-    const [dx, dy] = move.map((v) => Math.sign(v) * Math.max(1, Math.round(Math.abs(v) * step)));
-    place(state.spot[0] + (move[0] ? dx : 0), state.spot[1] + (move[1] ? dy : 0));
+    const step = event.shiftKey ? region()[0] : Math.max(1, Math.round(region()[0] / 8));
+    place(state.spot[0] + direction[0] * step, state.spot[1] + direction[1] * step);
   });
 
   // Controls ----------------------------------------------------------------------------------

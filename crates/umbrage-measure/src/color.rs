@@ -43,11 +43,7 @@ impl ErrorScale {
     /// # Errors
     /// If `max` is not in (1, 10⁶].
     pub fn new(max: f32) -> Result<Self, Error> {
-        if max > 1.0 && max <= 1e6 {
-            Ok(Self { max })
-        } else {
-            Err(Error::Scale { max })
-        }
+        if max > 1.0 && max <= 1e6 { Ok(Self { max }) } else { Err(Error::Scale { max }) }
     }
 
     /// The largest error with a colour of its own, pixels per texel; the smallest is one over it.
@@ -109,13 +105,8 @@ static DIVERGING: LazyLock<[Rgb; 513]> = LazyLock::new(|| {
 
 /// The point at a share of the length of a polyline.
 fn along(points: &[[f32; 3]], share: f32) -> [f32; 3] {
-    let length = |p: &[[f32; 3]]| {
-        p[0].iter()
-            .zip(p[1])
-            .map(|(a, b)| (b - a).powi(2))
-            .sum::<f32>()
-            .sqrt()
-    };
+    let length =
+        |p: &[[f32; 3]]| p[0].iter().zip(p[1]).map(|(a, b)| (b - a).powi(2)).sum::<f32>().sqrt();
     let mut left = share * points.windows(2).map(length).sum::<f32>();
     for pair in points.windows(2) {
         let piece = length(pair);
@@ -163,11 +154,7 @@ mod tests {
     fn linear(c: Rgb) -> [f32; 3] {
         c.map(|v| {
             let v = f32::from(v) / 255.0;
-            if v <= 0.040_45 {
-                v / 12.92
-            } else {
-                ((v + 0.055) / 1.055).powf(2.4)
-            }
+            if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
         })
     }
 
@@ -195,11 +182,7 @@ mod tests {
     }
 
     fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).powi(2))
-            .sum::<f32>()
-            .sqrt()
+        a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
     }
 
     /// Linear sRGB as dichromats see it: Machado et al. 2009, severity 1.
@@ -227,10 +210,7 @@ mod tests {
         for side in [-16..0, 0..16] {
             let steps: Vec<f32> = side.map(|i| distance(at(i), at(i + 1))).collect();
             let mean = steps.iter().sum::<f32>() / 16.0;
-            assert!(
-                steps.iter().all(|s| (s / mean - 1.0).abs() < 0.15),
-                "{mean} {steps:?}"
-            );
+            assert!(steps.iter().all(|s| (s / mean - 1.0).abs() < 0.15), "{mean} {steps:?}");
         }
     }
 
@@ -241,17 +221,13 @@ mod tests {
             assert!(distance(seen(m, FALSE_LIGHT), seen(m, FALSE_SHADOW)) > 0.2);
             for i in 0..16 {
                 let p = i as f32 / 16.0;
-                let (finer, coarser) = (
-                    seen(m, color_at(-p - 0.0625)),
-                    seen(m, color_at(p + 0.0625)),
-                );
+                let (finer, coarser) =
+                    (seen(m, color_at(-p - 0.0625)), seen(m, color_at(p + 0.0625)));
                 assert!(distance(finer, coarser) > 0.03 + 0.1 * p, "at ±{p}");
                 // Lightness falls outwards on both sides, so that order shows without any hue.
                 for s in [-1.0, 1.0] {
-                    let (inner, outer) = (
-                        seen(m, color_at(s * p)),
-                        seen(m, color_at(s * (p + 0.0625))),
-                    );
+                    let (inner, outer) =
+                        (seen(m, color_at(s * p)), seen(m, color_at(s * (p + 0.0625))));
                     assert!(inner[0] > outer[0], "at {}", s * p);
                 }
             }
@@ -274,15 +250,9 @@ mod tests {
         let [r, _, b] = color(0.125);
         assert!(b > r + 60, "fine is blue");
         let middle = color(1.0);
-        assert!(
-            middle.iter().all(|&v| v > 235),
-            "one to one is pale: {middle:?}"
-        );
+        assert!(middle.iter().all(|&v| v > 235), "one to one is pale: {middle:?}");
         for bad in [1.0, 0.0, -2.0, f32::NAN, f32::INFINITY] {
-            assert!(
-                matches!(ErrorScale::new(bad), Err(Error::Scale { .. })),
-                "{bad}"
-            );
+            assert!(matches!(ErrorScale::new(bad), Err(Error::Scale { .. })), "{bad}");
         }
     }
 }

@@ -14,10 +14,7 @@ use std::path::Path;
 /// If the folder does not exist or cannot be written; nothing stays behind then.
 pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     let path = path.as_ref();
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".umbrage-");
     // Temporary files are private by default; these become ordinary ones.
@@ -29,10 +26,7 @@ pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
         file.persist(path).map_err(|e| e.error)?;
         Ok(())
     };
-    write().map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
-    })
+    write().map_err(|source| Error::Write { path: path.to_owned(), source })
 }
 
 /// A kind of pixel that PNG files hold.
@@ -69,10 +63,7 @@ pub fn write_png<P: PngPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Resul
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
         .write_image(P::bytes(image.pixels()), w, h, P::COLOR)
-        .map_err(|e| Error::Encode {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })?;
+        .map_err(|e| Error::Encode { path: path.to_owned(), reason: e.to_string() })?;
     write_file(path, &bytes)
 }
 
@@ -115,10 +106,7 @@ pub fn write_exr<P: ExrPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Resul
     let mut bytes = Cursor::new(Vec::new());
     exr.write()
         .to_buffered(&mut bytes)
-        .map_err(|e| Error::Encode {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })?;
+        .map_err(|e| Error::Encode { path: path.to_owned(), reason: e.to_string() })?;
     write_file(path, bytes.get_ref())
 }
 
@@ -127,9 +115,7 @@ mod tests {
     use super::*;
 
     fn only_file(folder: &Path) -> Vec<String> {
-        let names = std::fs::read_dir(folder)
-            .unwrap()
-            .map(|f| f.unwrap().file_name());
+        let names = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name());
         names.map(|n| n.into_string().unwrap()).collect()
     }
 
@@ -137,19 +123,11 @@ mod tests {
     fn png_comes_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        write_png(
-            &path,
-            &Image::from_fn([3, 2], |x, y| [x as u8, y as u8, 7]).unwrap(),
-        )
-        .unwrap();
+        write_png(&path, &Image::from_fn([3, 2], |x, y| [x as u8, y as u8, 7]).unwrap()).unwrap();
         let read = image::open(&path).unwrap();
         assert_eq!(read.color(), image::ColorType::Rgb8);
         assert_eq!(read.to_rgb8().get_pixel(2, 1).0, [2, 1, 7]);
-        write_png(
-            &path,
-            &Image::from_fn([2, 2], |x, _| 255 * x as u8).unwrap(),
-        )
-        .unwrap();
+        write_png(&path, &Image::from_fn([2, 2], |x, _| 255 * x as u8).unwrap()).unwrap();
         let read = image::open(&path).unwrap();
         assert_eq!(read.color(), image::ColorType::L8);
         assert_eq!(read.to_luma8().into_raw(), [0, 255, 0, 255]);
@@ -165,16 +143,10 @@ mod tests {
         let read = exr::prelude::read_first_flat_layer_from_file(&path).unwrap();
         let channel = &read.layer_data.channel_data.list[0];
         assert_eq!(channel.name.to_string(), "Y");
-        let FlatSamples::F32(samples) = &channel.sample_data else {
-            panic!("not f32")
-        };
+        let FlatSamples::F32(samples) = &channel.sample_data else { panic!("not f32") };
         let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(samples), bits(&values));
-        write_exr(
-            &path,
-            &Image::from_fn([2, 1], |x, _| [x as f32, 2.0, 3.0]).unwrap(),
-        )
-        .unwrap();
+        write_exr(&path, &Image::from_fn([2, 1], |x, _| [x as f32, 2.0, 3.0]).unwrap()).unwrap();
         let read = image::open(&path).unwrap().to_rgb32f();
         assert_eq!(read.get_pixel(1, 0).0, [1.0, 2.0, 3.0]);
     }

@@ -15,10 +15,7 @@ impl<T> Image<T> {
     pub fn new(size: [u32; 2], pixels: Vec<T>) -> Result<Self, Error> {
         check_size(size)?;
         if pixels.len() as u64 != u64::from(size[0]) * u64::from(size[1]) {
-            return Err(Error::Values {
-                size,
-                values: pixels.len(),
-            });
+            return Err(Error::Values { size, values: pixels.len() });
         }
         Ok(Self { size, pixels })
     }
@@ -27,13 +24,8 @@ impl<T> Image<T> {
     pub fn from_fn(size: [u32; 2], mut value: impl FnMut(u32, u32) -> T) -> Result<Self, Error> {
         check_size(size)?;
         let [w, h] = size;
-        let pixels = (0..h)
-            .flat_map(|y| (0..w).map(move |x| (x, y)))
-            .map(|(x, y)| value(x, y));
-        Ok(Self {
-            size,
-            pixels: pixels.collect(),
-        })
+        let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| value(x, y));
+        Ok(Self { size, pixels: pixels.collect() })
     }
 
     /// Width and height, pixels.
@@ -51,20 +43,13 @@ impl<T> Image<T> {
     /// # Panics
     /// If they lie outside.
     pub fn at(&self, x: u32, y: u32) -> &T {
-        assert!(
-            x < self.size[0] && y < self.size[1],
-            "pixel ({x}, {y}) outside {:?}",
-            self.size
-        );
+        assert!(x < self.size[0] && y < self.size[1], "pixel ({x}, {y}) outside {:?}", self.size);
         &self.pixels[self.index(x, y)]
     }
 
     /// The image of `f` of each value.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Image<U> {
-        Image {
-            size: self.size,
-            pixels: self.pixels.iter().map(f).collect(),
-        }
+        Image { size: self.size, pixels: self.pixels.iter().map(f).collect() }
     }
 
     pub(crate) fn index(&self, x: u32, y: u32) -> usize {
@@ -82,11 +67,7 @@ impl<T> Image<T> {
         if self.size == truth.size {
             return Ok(());
         }
-        Err(Error::Mismatch {
-            what,
-            expected: truth.size,
-            size: self.size,
-        })
+        Err(Error::Mismatch { what, expected: truth.size, size: self.size })
     }
 }
 
@@ -94,8 +75,5 @@ fn check_size(size: [u32; 2]) -> Result<(), Error> {
     if size.iter().all(|n| (1..=65536).contains(n)) {
         return Ok(());
     }
-    Err(Error::Size {
-        what: "image",
-        size,
-    })
+    Err(Error::Size { what: "image", size })
 }

@@ -30,15 +30,7 @@ pub fn difference_map(
             return below;
         }
         let difference = technique.at(x, y).clamp(0.0, 1.0) - truth.at(x, y).clamp(0.0, 1.0);
-        mix(
-            below,
-            if difference > 0.0 {
-                FALSE_LIGHT
-            } else {
-                FALSE_SHADOW
-            },
-            difference.abs(),
-        )
+        mix(below, if difference > 0.0 { FALSE_LIGHT } else { FALSE_SHADOW }, difference.abs())
     })
 }
 
@@ -59,11 +51,7 @@ pub fn error_map(
         if !counted.at(x, y) {
             return dimmed(*picture.at(x, y), false);
         }
-        let hatch = if (x + y) / 3 % 2 == 0 {
-            [90; 3]
-        } else {
-            [160; 3]
-        };
+        let hatch = if (x + y) / 3 % 2 == 0 { [90; 3] } else { [160; 3] };
         scale.color(*error_px.at(x, y)).unwrap_or(hatch)
     })
 }
@@ -138,7 +126,7 @@ fn gradient(texel: &Image<[f32; 2]>, x: u32, y: u32, axis: usize) -> f32 {
 
 /// Grey and darker, so that colours over it stand out.
 fn dimmed(color: Rgb, counted: bool) -> Rgb {
-    let strength = if counted { 0.5 } else { 0.25 };
+    let strength = if counted { 0.4 } else { 0.2 };
     [(luma(color) * strength + 14.0) as u8; 3]
 }
 
@@ -162,7 +150,7 @@ mod tests {
         let counted = image([4, 1], &[true, true, true, false]);
         let picture = image([4, 1], &[[200; 3]; 4]);
         let map = difference_map(&truth, &technique, &counted, &picture).unwrap();
-        assert_eq!(map.pixels(), [FALSE_LIGHT, FALSE_SHADOW, [114; 3], [64; 3]]);
+        assert_eq!(map.pixels(), [FALSE_LIGHT, FALSE_SHADOW, [94; 3], [54; 3]]);
     }
 
     #[test]
@@ -172,12 +160,7 @@ mod tests {
         let picture = image([4, 1], &[[200; 3]; 4]);
         let scale = ErrorScale::default();
         let map = error_map(&error, &counted, &picture, scale).unwrap();
-        let expected = [
-            scale.color(1.0).unwrap(),
-            scale.color(8.0).unwrap(),
-            [90; 3],
-            [64; 3],
-        ];
+        let expected = [scale.color(1.0).unwrap(), scale.color(8.0).unwrap(), [90; 3], [64; 3]];
         assert_eq!(map.pixels(), expected);
         assert!(error_map(&error, &image([1, 1], &[true]), &picture, scale).is_err());
     }
@@ -186,7 +169,7 @@ mod tests {
     fn partitions_repeat_and_gaps_stay_grey() {
         let index = image([3, 1], &[Some(0), Some(PARTITIONS.len() as u16), None]);
         let map = partition_map(&index, &image([3, 1], &[[255; 3]; 3])).unwrap();
-        assert_eq!(map.pixels(), [PARTITIONS[0], PARTITIONS[0], [77; 3]]);
+        assert_eq!(map.pixels(), [PARTITIONS[0], PARTITIONS[0], [65; 3]]);
     }
 
     #[test]
@@ -204,6 +187,6 @@ mod tests {
         // Nothing served: only dimmed.
         let none = image([2, 2], &[[f32::NAN; 2]; 4]);
         let map = texel_map(&none, &none.map(|_| [255; 3])).unwrap();
-        assert_eq!(map.pixels(), [[77; 3]; 4]);
+        assert_eq!(map.pixels(), [[65; 3]; 4]);
     }
 }

@@ -84,19 +84,13 @@ pub fn measure(
 /// Sizes that differ.
 pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<ErrorPx, Error> {
     error.check_like(counted, "error")?;
-    let all = error
-        .pixels()
-        .iter()
-        .zip(counted.pixels())
-        .filter(|&(_, &counted)| counted);
+    let all = error.pixels().iter().zip(counted.pixels()).filter(|&(_, &counted)| counted);
     let (mut finite, undefined): (Vec<f32>, Vec<f32>) =
         all.map(|(&e, _)| e).partition(|e| e.is_finite());
     let mut percentile = |p: f64| {
         let rank = (p * finite.len() as f64).ceil() as usize;
         let index = rank.checked_sub(1)?;
-        Some(f64::from(
-            *finite.select_nth_unstable_by(index, f32::total_cmp).1,
-        ))
+        Some(f64::from(*finite.select_nth_unstable_by(index, f32::total_cmp).1))
     };
     Ok(ErrorPx {
         p50: percentile(0.50),
@@ -159,10 +153,7 @@ pub(crate) fn check_visibilities(
     counted.check_like(truth, "mask of counted pixels")?;
     for (what, image) in [("truth", truth), ("visibility", technique)] {
         let values = image.pixels().iter().zip(counted.pixels());
-        if let Some(i) = values
-            .clone()
-            .position(|(v, &counted)| counted && !v.is_finite())
-        {
+        if let Some(i) = values.clone().position(|(v, &counted)| counted && !v.is_finite()) {
             return Err(Error::NotFinite {
                 what,
                 pixel: image.position(i),
@@ -176,11 +167,7 @@ pub(crate) fn check_visibilities(
 fn flip(truth: &Image<f32>, technique: &Image<f32>, counted: &Image<bool>) -> f64 {
     let [w, h] = truth.size();
     let picture = |visibility: &Image<f32>| {
-        let values = visibility
-            .pixels()
-            .iter()
-            .zip(truth.pixels())
-            .zip(counted.pixels());
+        let values = visibility.pixels().iter().zip(truth.pixels()).zip(counted.pixels());
         let rgb: Vec<u8> = values
             .flat_map(|((&v, &truth), &counted)| {
                 [crate::maps::grey(if counted { v } else { truth }); 3]
@@ -188,11 +175,7 @@ fn flip(truth: &Image<f32>, technique: &Image<f32>, counted: &Image<bool>) -> f6
             .collect();
         nv_flip::FlipImageRgb8::with_data(w, h, &rgb)
     };
-    let map = nv_flip::flip(
-        picture(truth),
-        picture(technique),
-        nv_flip::DEFAULT_PIXELS_PER_DEGREE,
-    );
+    let map = nv_flip::flip(picture(truth), picture(technique), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
     // Summed here in f64: the pool of `nv_flip` sums in f32 and keeps a histogram besides.
     let values = map.to_vec();
     values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
@@ -247,11 +230,8 @@ mod tests {
 
     #[test]
     fn tiny_images_have_metrics() {
-        let (dark, lit, counted) = (
-            image([1, 1], &[0.0]),
-            image([1, 1], &[1.0]),
-            image([1, 1], &[true]),
-        );
+        let (dark, lit, counted) =
+            (image([1, 1], &[0.0]), image([1, 1], &[1.0]), image([1, 1], &[true]));
         let m = measure(&dark, &lit, &counted).unwrap();
         assert_eq!(m.wrong_fraction, Some(1.0));
         assert!(m.flip.unwrap() > 0.5, "{m:?}");
@@ -271,18 +251,9 @@ mod tests {
             text(measure(&a, &nan, &counted)),
             "visibility: pixel (1, 0) is NaN, must be finite"
         );
-        assert_eq!(
-            text(measure(&nan, &a, &counted)),
-            "truth: pixel (1, 0) is NaN, must be finite"
-        );
-        assert!(matches!(
-            Image::<f32>::new([0, 4], vec![]),
-            Err(Error::Size { .. })
-        ));
-        assert!(matches!(
-            Image::new([2, 2], vec![1.0]),
-            Err(Error::Values { values: 1, .. })
-        ));
+        assert_eq!(text(measure(&nan, &a, &counted)), "truth: pixel (1, 0) is NaN, must be finite");
+        assert!(matches!(Image::<f32>::new([0, 4], vec![]), Err(Error::Size { .. })));
+        assert!(matches!(Image::new([2, 2], vec![1.0]), Err(Error::Values { values: 1, .. })));
     }
 
     #[test]
@@ -292,36 +263,22 @@ mod tests {
         values.extend([1e9, f32::INFINITY, f32::NAN]);
         let error = image([103, 1], &values);
         let counted = Image::from_fn([103, 1], |x, _| x != 100).unwrap();
-        let expected = ErrorPx {
-            p50: Some(50.0),
-            p95: Some(95.0),
-            max: Some(100.0),
-            undefined: 2,
-        };
+        let expected = ErrorPx { p50: Some(50.0), p95: Some(95.0), max: Some(100.0), undefined: 2 };
         assert_eq!(measure_error_px(&error, &counted).unwrap(), expected);
         let one = image([1, 1], &[3.0]);
-        let only = ErrorPx {
-            p50: Some(3.0),
-            p95: Some(3.0),
-            max: Some(3.0),
-            undefined: 0,
-        };
+        let only = ErrorPx { p50: Some(3.0), p95: Some(3.0), max: Some(3.0), undefined: 0 };
         assert_eq!(measure_error_px(&one, &one.map(|_| true)).unwrap(), only);
     }
 
     #[test]
     fn finds_the_worst_spot() {
         let truth = Image::from_fn([100, 70], |_, _| 1.0).unwrap();
-        let technique = Image::from_fn([100, 70], |x, y| {
-            f32::from(!(x > 96 && y > 64 || x < 2 && y < 2))
-        })
-        .unwrap();
+        let technique =
+            Image::from_fn([100, 70], |x, y| f32::from(!(x > 96 && y > 64 || x < 2 && y < 2)))
+                .unwrap();
         let all = truth.map(|_| true);
         // The lower right cell is cut off by the picture's edge; its centre stays inside.
-        assert_eq!(
-            worst_spot(&truth, &technique, &all).unwrap(),
-            Some([99, 69])
-        );
+        assert_eq!(worst_spot(&truth, &technique, &all).unwrap(), Some([99, 69]));
         assert_eq!(worst_spot(&truth, &truth, &all).unwrap(), None);
     }
 }

@@ -66,10 +66,7 @@ pub fn write_truth_pictures(
         ..Pictures::default()
     };
     write_png(folder.join(&pictures.color), truth.color)?;
-    write_png(
-        folder.join(&pictures.visibility),
-        &truth.visibility.map(|&v| grey(v)),
-    )?;
+    write_png(folder.join(&pictures.visibility), &truth.visibility.map(|&v| grey(v)))?;
     Ok(pictures)
 }
 
@@ -87,12 +84,7 @@ pub fn write_pictures(
     truth: &SeenTruth<'_>,
     scale: ErrorScale,
 ) -> Result<Pictures, Error> {
-    let &Seen {
-        color,
-        visibility,
-        error_px,
-        ..
-    } = seen;
+    let &Seen { color, visibility, error_px, .. } = seen;
     let counted = truth.counted;
     let spot = worst_spot(truth.visibility, visibility, counted)?;
     let difference = difference_map(truth.visibility, visibility, counted, truth.color)?;
@@ -105,10 +97,7 @@ pub fn write_pictures(
         write_png(folder.as_ref().join(&name), image).map(|()| name)
     };
     let grey_name = name("visibility");
-    write_png(
-        folder.as_ref().join(&grey_name),
-        &visibility.map(|&v| grey(v)),
-    )?;
+    write_png(folder.as_ref().join(&grey_name), &visibility.map(|&v| grey(v)))?;
     Ok(Pictures {
         color: write("color", color)?,
         visibility: grey_name,
@@ -123,10 +112,7 @@ pub fn write_pictures(
 /// A shadow specification as part of a file name that every system and every URL takes.
 fn file_stem(shadows: &str) -> String {
     let safe = |c: char| c.is_ascii_alphanumeric() || c == '.' || c == '_';
-    let dashed: String = shadows
-        .chars()
-        .map(|c| if safe(c) { c } else { '-' })
-        .collect();
+    let dashed: String = shadows.chars().map(|c| if safe(c) { c } else { '-' }).collect();
     let parts: Vec<&str> = dashed.split('-').filter(|p| !p.is_empty()).collect();
     parts.join("-").chars().take(80).collect()
 }
@@ -138,10 +124,7 @@ mod tests {
     #[test]
     fn file_names_are_safe() {
         assert_eq!(file_stem("lispsm+z4:pcf5@2048"), "lispsm-z4-pcf5-2048");
-        assert_eq!(
-            file_stem("lambda=0.5:csm8(blur=7)"),
-            "lambda-0.5-csm8-blur-7"
-        );
+        assert_eq!(file_stem("lambda=0.5:csm8(blur=7)"), "lambda-0.5-csm8-blur-7");
         assert_eq!(file_stem("../\"<x>é"), "..-x");
         assert_eq!(file_stem(&"x".repeat(300)).len(), 80);
     }

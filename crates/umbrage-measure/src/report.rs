@@ -116,9 +116,7 @@ pub struct Times {
 impl Times {
     /// All stages together, milliseconds; `None` if none is known.
     pub fn total(&self) -> Option<f64> {
-        let known = [self.plan, self.depth, self.filter, self.shade]
-            .into_iter()
-            .flatten();
+        let known = [self.plan, self.depth, self.filter, self.shade].into_iter().flatten();
         known.reduce(|a, b| a + b)
     }
 }

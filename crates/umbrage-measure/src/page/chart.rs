@@ -49,9 +49,7 @@ pub(super) fn gradient() -> String {
 pub(super) fn ticks(scale: ErrorScale) -> Vec<Tick> {
     let largest = scale.max().log2().floor() as i32;
     let step = (largest + 1) / 3;
-    let outer = (0..)
-        .map(|i| largest - i * step.max(1))
-        .take_while(|&e| e > 0);
+    let outer = (0..).map(|i| largest - i * step.max(1)).take_while(|&e| e > 0);
     let mut exponents: Vec<i32> = outer.flat_map(|e| [e, -e]).chain([0]).collect();
     exponents.sort_unstable();
     let tick = |&e: &i32| Tick {
@@ -64,16 +62,9 @@ pub(super) fn ticks(scale: ErrorScale) -> Vec<Tick> {
 
 /// The results' lines, in their order.
 pub(super) fn lines(report: &Report, scale: ErrorScale) -> Vec<Line> {
-    let wrong = report
-        .results
-        .iter()
-        .filter_map(|r| r.metrics.wrong_fraction);
+    let wrong = report.results.iter().filter_map(|r| r.metrics.wrong_fraction);
     let widest = wrong.fold(0.0, f64::max);
-    report
-        .results
-        .iter()
-        .map(|r| line(r, widest, scale))
-        .collect()
+    report.results.iter().map(|r| line(r, widest, scale)).collect()
 }
 
 fn line(result: &Measured, widest: f64, scale: ErrorScale) -> Line {
@@ -101,9 +92,7 @@ fn line(result: &Measured, widest: f64, scale: ErrorScale) -> Line {
     Line {
         false_light: width(m.false_light),
         false_shadow: width(m.false_shadow),
-        wrong_text: m
-            .wrong_fraction
-            .map_or("nothing to measure".to_owned(), |w| percent(w) + " %"),
+        wrong_text: m.wrong_fraction.map_or("nothing to measure".to_owned(), |w| percent(w) + " %"),
         range,
     }
 }
@@ -120,10 +109,7 @@ mod tests {
     #[test]
     fn ticks_mark_one_and_both_ends() {
         let labels = |max| -> Vec<String> {
-            ticks(ErrorScale::new(max).unwrap())
-                .into_iter()
-                .map(|t| t.label)
-                .collect()
+            ticks(ErrorScale::new(max).unwrap()).into_iter().map(|t| t.label).collect()
         };
         assert_eq!(labels(32.0), ["1/32", "1/8", "1/2", "1", "2", "8", "32"]);
         assert_eq!(labels(1.5), ["1"]);

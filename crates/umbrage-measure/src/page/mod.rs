@@ -38,14 +38,10 @@ pub fn write_report(folder: impl AsRef<Path>, page: &Page<'_>) -> Result<(), Err
     let folder = folder.as_ref();
     check(folder, page)?;
     let path = folder.join("index.html");
-    let html = view::Html::new(page)?.render().map_err(|e| Error::Encode {
-        path: path.clone(),
-        reason: e.to_string(),
-    })?;
-    write_file(
-        folder.join("report.json"),
-        page.report.to_json()?.as_bytes(),
-    )?;
+    let html = view::Html::new(page)?
+        .render()
+        .map_err(|e| Error::Encode { path: path.clone(), reason: e.to_string() })?;
+    write_file(folder.join("report.json"), page.report.to_json()?.as_bytes())?;
     write_file(path, html.as_bytes())
 }
 
@@ -56,16 +52,10 @@ fn check(folder: &Path, page: &Page<'_>) -> Result<(), Error> {
         return wrong("report.results", "must not be empty".to_owned());
     }
     if page.report.size.contains(&0) {
-        return wrong(
-            "report.size",
-            "must be at least 1 pixel each way".to_owned(),
-        );
+        return wrong("report.size", "must be at least 1 pixel each way".to_owned());
     }
     if results != sets {
-        return wrong(
-            "pictures",
-            format!("must be one set a result ({results}), are {sets}"),
-        );
+        return wrong("pictures", format!("must be one set a result ({results}), are {sets}"));
     }
     let missing = page
         .pictures

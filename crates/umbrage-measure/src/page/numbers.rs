@@ -49,21 +49,13 @@ pub(super) fn vector(v: [f64; 3]) -> String {
 pub(super) fn plain(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.replace('-', "−")
-    }
+    if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
 }
 
 /// 2 to the power of `exponent`, below 1 as a fraction: `1/8`, `1`, `32`.
 pub(super) fn power_of_two(exponent: i32) -> String {
     let power = 1_u64 << exponent.unsigned_abs();
-    if exponent < 0 {
-        format!("1/{power}")
-    } else {
-        power.to_string()
-    }
+    if exponent < 0 { format!("1/{power}") } else { power.to_string() }
 }
 
 fn grouped(digits: &str) -> String {

@@ -45,11 +45,7 @@ const fn column(
 /// The columns that have something to show in this report.
 pub(super) fn columns(report: &Report) -> Vec<Column> {
     let optional = |c: Column| Column { always: false, ..c };
-    let whole = |c: Column| Column {
-        smaller_is_better: false,
-        text: |v| count(v as u64),
-        ..c
-    };
+    let whole = |c: Column| Column { smaller_is_better: false, text: |v| count(v as u64), ..c };
     let share = |c: Column| Column { text: percent, ..c };
     let columns = [
         share(column(
@@ -58,76 +54,39 @@ pub(super) fn columns(report: &Report) -> Vec<Column> {
             "Counted pixels whose visibility is off by more than half",
             |r| r.metrics.wrong_fraction,
         )),
-        share(column(
-            "False light",
-            "%",
-            "Counted pixels that are lit and should be dark",
-            |r| r.metrics.false_light,
-        )),
-        share(column(
-            "False shadow",
-            "%",
-            "Counted pixels that are dark and should be lit",
-            |r| r.metrics.false_shadow,
-        )),
-        column(
-            "Mean error",
-            "0–1",
-            "Mean absolute difference of visibility",
-            |r| r.metrics.mean_abs_error,
-        ),
+        share(column("False light", "%", "Counted pixels that are lit and should be dark", |r| {
+            r.metrics.false_light
+        })),
+        share(column("False shadow", "%", "Counted pixels that are dark and should be lit", |r| {
+            r.metrics.false_shadow
+        })),
+        column("Mean error", "0–1", "Mean absolute difference of visibility", |r| {
+            r.metrics.mean_abs_error
+        }),
         column(
             "ꟻLIP",
             "0–1",
             "Difference that a viewer flipping between both pictures would notice",
             |r| r.metrics.flip,
         ),
-        column("p50", "px/texel", "Median of pixels per texel", |r| {
-            r.error_px.p50
-        }),
-        column(
-            "p95",
-            "px/texel",
-            "95th percentile of pixels per texel",
-            |r| r.error_px.p95,
-        ),
-        column(
-            "max",
-            "px/texel",
-            "Largest number of pixels per texel",
-            |r| r.error_px.max,
-        ),
+        column("p50", "px/texel", "Median of pixels per texel", |r| r.error_px.p50),
+        column("p95", "px/texel", "95th percentile of pixels per texel", |r| r.error_px.p95),
+        column("max", "px/texel", "Largest number of pixels per texel", |r| r.error_px.max),
         column(
             "Storage",
             "factor",
             "Texels needed per pixel for an error of one pixel per texel",
             |r| r.storage_factor,
         ),
-        whole(column("Maps", "", "Number of shadow maps", |r| {
-            Some(f64::from(r.maps))
-        })),
-        whole(column("Texels", "", "Texels of all maps together", |r| {
-            Some(r.texels as f64)
-        })),
+        whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
+        whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
         optional(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),
-        optional(column("Depth", "ms", "Time to render the maps", |r| {
-            r.ms.depth
+        optional(column("Depth", "ms", "Time to render the maps", |r| r.ms.depth)),
+        optional(column("Filter", "ms", "Time to filter the maps ahead of lookup", |r| {
+            r.ms.filter
         })),
-        optional(column(
-            "Filter",
-            "ms",
-            "Time to filter the maps ahead of lookup",
-            |r| r.ms.filter,
-        )),
-        optional(column(
-            "Shade",
-            "ms",
-            "Time to look the maps up for the picture",
-            |r| r.ms.shade,
-        )),
-        column("Total", "ms", "Time of all stages together", |r| {
-            r.ms.total()
-        }),
+        optional(column("Shade", "ms", "Time to look the maps up for the picture", |r| r.ms.shade)),
+        column("Total", "ms", "Time of all stages together", |r| r.ms.total()),
     ];
     let has_figures =
         |c: &Column| c.always || report.results.iter().any(|r| (c.value)(r).is_some());
@@ -137,11 +96,8 @@ pub(super) fn columns(report: &Report) -> Vec<Column> {
 impl Column {
     /// The cells of this column, in the results' order.
     pub(super) fn cells(&self, report: &Report) -> Vec<Cell> {
-        let values: Vec<Option<f64>> = report
-            .results
-            .iter()
-            .map(|r| (self.value)(r).filter(|v| v.is_finite()))
-            .collect();
+        let values: Vec<Option<f64>> =
+            report.results.iter().map(|r| (self.value)(r).filter(|v| v.is_finite())).collect();
         let known = || values.iter().flatten().copied();
         let smallest = known().fold(f64::INFINITY, f64::min);
         let largest = known().fold(f64::NEG_INFINITY, f64::max);
@@ -149,16 +105,10 @@ impl Column {
         values
             .iter()
             .map(|value| match *value {
-                Some(v) => Cell {
-                    text: (self.text)(v),
-                    key: v.to_string(),
-                    best: ranked && v == smallest,
-                },
-                None => Cell {
-                    text: UNKNOWN.to_owned(),
-                    key: String::new(),
-                    best: false,
-                },
+                Some(v) => {
+                    Cell { text: (self.text)(v), key: v.to_string(), best: ranked && v == smallest }
+                }
+                None => Cell { text: UNKNOWN.to_owned(), key: String::new(), best: false },
             })
             .collect()
     }

@@ -2,10 +2,7 @@
 
 /// What the warp of a shadow specification is; `None` for one not listed here.
 pub(super) fn description(shadows: &str) -> Option<&'static str> {
-    let name = shadows
-        .split(['+', ':', '@', '='])
-        .next()
-        .unwrap_or_default();
+    let name = shadows.split(['+', ':', '@', '=']).next().unwrap_or_default();
     Some(match name {
         "unfocused" => "One evenly spaced map over everything, whatever the camera sees.",
         "uniform" => "An evenly spaced map, focused on what the camera sees.",
@@ -43,20 +40,9 @@ mod tests {
 
     #[test]
     fn finds_the_warp_in_a_specification() {
-        assert!(
-            description("lispsm+z4:pcf5@2048")
-                .unwrap()
-                .starts_with("Light space")
-        );
-        assert!(
-            description("lambda=0.5@64")
-                .unwrap()
-                .contains("given distance")
-        );
-        assert_ne!(
-            description("adaptive(area)+face@1024"),
-            description("adaptive@1024")
-        );
+        assert!(description("lispsm+z4:pcf5@2048").unwrap().starts_with("Light space"));
+        assert!(description("lambda=0.5@64").unwrap().contains("given distance"));
+        assert_ne!(description("adaptive(area)+face@1024"), description("adaptive@1024"));
         assert_eq!(description(""), None);
         assert_eq!(description("lispsmx"), None);
     }

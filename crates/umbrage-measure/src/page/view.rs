@@ -79,26 +79,14 @@ impl Pictures {
             ("partition", &self.partition),
             ("texels", &self.texels),
         ];
-        let some = some
-            .into_iter()
-            .filter_map(|(kind, file)| Some((kind, file.as_ref()?)));
-        always
-            .into_iter()
-            .chain(some)
-            .map(|(kind, file)| (kind, file.as_str()))
+        let some = some.into_iter().filter_map(|(kind, file)| Some((kind, file.as_ref()?)));
+        always.into_iter().chain(some).map(|(kind, file)| (kind, file.as_str()))
     }
 }
 
 impl<'a> Html<'a> {
     pub(super) fn new(page: &Page<'a>) -> Result<Self, Error> {
-        let Page {
-            report,
-            truth,
-            pictures,
-            scale,
-            notices,
-            command,
-        } = *page;
+        let Page { report, truth, pictures, scale, notices, command } = *page;
         let columns = table::columns(report);
         let mut rows: Vec<Vec<Cell>> = report.results.iter().map(|_| Vec::new()).collect();
         for column in &columns {
@@ -141,10 +129,7 @@ impl<'a> Html<'a> {
             scene: &report.scene,
             size: report.size,
             small: w < 480,
-            facts: format!(
-                "{w} × {h} pixels · {n} technique{}",
-                if n == 1 { "" } else { "s" }
-            ),
+            facts: format!("{w} × {h} pixels · {n} technique{}", if n == 1 { "" } else { "s" }),
             finding: finding(report, best),
             kinds,
             truth,
@@ -167,21 +152,14 @@ impl<'a> Html<'a> {
 /// The result with the fewest wrong pixels, then the smallest mean error, if there are others.
 fn best(report: &Report) -> Option<usize> {
     let figures = |r: &Measured| Some((r.metrics.wrong_fraction?, r.metrics.mean_abs_error?));
-    let known = report
-        .results
-        .iter()
-        .enumerate()
-        .filter_map(|(i, r)| Some((i, figures(r)?)));
+    let known = report.results.iter().enumerate().filter_map(|(i, r)| Some((i, figures(r)?)));
     let best = known.min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     best.map(|(i, _)| i).filter(|_| report.results.len() > 1)
 }
 
 fn finding(report: &Report, best: Option<usize>) -> Finding {
     let wrong = |r: &Measured| r.metrics.wrong_fraction.unwrap_or(0.0);
-    let say = |r: &Measured, rest| Finding {
-        name: r.shadows.clone(),
-        rest,
-    };
+    let say = |r: &Measured, rest| Finding { name: r.shadows.clone(), rest };
     let first = &report.results[0];
     if first.metrics.counted == 0 {
         return Finding {
@@ -193,17 +171,10 @@ fn finding(report: &Report, best: Option<usize>) -> Finding {
     let Some(best) = best.map(|i| &report.results[i]) else {
         return say(
             first,
-            format!(
-                "shows {} % of the counted pixels wrong.",
-                percent(wrong(first))
-            ),
+            format!("shows {} % of the counted pixels wrong.", percent(wrong(first))),
         );
     };
-    let worst = report
-        .results
-        .iter()
-        .max_by(|a, b| wrong(a).total_cmp(&wrong(b)))
-        .unwrap_or(best);
+    let worst = report.results.iter().max_by(|a, b| wrong(a).total_cmp(&wrong(b))).unwrap_or(best);
     let closest = format!("comes closest to the truth: {} % of", percent(wrong(best)));
     let rest = if wrong(worst) == wrong(best) {
         format!("{closest} the counted pixels are wrong, as with all the others.")
@@ -224,11 +195,7 @@ fn counted(report: &Report) -> String {
     let pixels = u64::from(report.size[0]) * u64::from(report.size[1]);
     let counted = report.results[0].metrics.counted;
     let share = percent(counted as f64 / pixels as f64);
-    format!(
-        "{} of the {} pixels here, {share} %",
-        count(counted),
-        count(pixels)
-    )
+    format!("{} of the {} pixels here, {share} %", count(counted), count(pixels))
 }
 
 fn truth_how(report: &Report) -> String {
@@ -254,27 +221,9 @@ fn label(kind: &str) -> &'static str {
 }
 
 fn kinds(pictures: &[Pictures]) -> Vec<Kind> {
-    let ids = [
-        "color",
-        "visibility",
-        "difference",
-        "error",
-        "partition",
-        "texels",
-    ];
-    let shown = |id: &&str| {
-        pictures
-            .iter()
-            .flat_map(Pictures::files)
-            .any(|(kind, _)| kind == *id)
-    };
-    ids.into_iter()
-        .filter(shown)
-        .map(|id| Kind {
-            id,
-            label: label(id),
-        })
-        .collect()
+    let ids = ["color", "visibility", "difference", "error", "partition", "texels"];
+    let shown = |id: &&str| pictures.iter().flat_map(Pictures::files).any(|(kind, _)| kind == *id);
+    ids.into_iter().filter(shown).map(|id| Kind { id, label: label(id) }).collect()
 }
 
 fn figures(r: &Measured) -> Vec<(&'static str, String)> {
@@ -284,8 +233,9 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
     [
         ("Mean error", known(r.metrics.mean_abs_error)),
         ("ꟻLIP", known(r.metrics.flip)),
-        ("Pixels per texel, median", known(e.p50)),
-        ("… 95th percentile", known(e.p95)),
+        ("px/texel, p50", known(e.p50)),
+        ("px/texel, p95", known(e.p95)),
+        ("px/texel, max", known(e.max)),
         ("Storage factor", known(r.storage_factor)),
         ("Maps", Some(count(u64::from(r.maps)))),
         ("Texels", Some(count(r.texels))),
@@ -299,23 +249,14 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
 
 fn setup(report: &Report) -> Vec<(&'static str, String)> {
     let view = &report.view;
-    let named = |name: &Option<String>| {
-        name.as_ref()
-            .map(|n| format!("“{n}”, "))
-            .unwrap_or_default()
-    };
+    let named =
+        |name: &Option<String>| name.as_ref().map(|n| format!("“{n}”, ")).unwrap_or_default();
     let mut setup = vec![
-        (
-            "Camera",
-            format!("{}at {} m", named(&view.name), vector(view.eye)),
-        ),
+        ("Camera", format!("{}at {} m", named(&view.name), vector(view.eye))),
         ("looks at", format!("{} m", vector(view.target))),
         ("up", vector(view.up)),
         ("field of view", format!("{}° vertically", plain(view.fov))),
-        (
-            "range",
-            format!("{} to {} m", significant(view.near), significant(view.far)),
-        ),
+        ("range", format!("{} to {} m", significant(view.near), significant(view.far))),
     ];
     match &report.light {
         LightInfo::Directional { name, direction } => {
@@ -324,25 +265,9 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
                 format!("{}directional, travels {}", named(name), vector(*direction)),
             ));
         }
-        LightInfo::Spot {
-            name,
-            position,
-            direction,
-            half_angle,
-            range,
-        } => setup.extend([
-            (
-                "Light",
-                format!("{}spot at {} m", named(name), vector(*position)),
-            ),
-            (
-                "shines",
-                format!(
-                    "{}, {}° to each side",
-                    vector(*direction),
-                    plain(*half_angle)
-                ),
-            ),
+        LightInfo::Spot { name, position, direction, half_angle, range } => setup.extend([
+            ("Light", format!("{}spot at {} m", named(name), vector(*position))),
+            ("shines", format!("{}, {}° to each side", vector(*direction), plain(*half_angle))),
             ("reaches", format!("{} m", significant(*range))),
         ]),
     }
@@ -384,19 +309,12 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
         name,
         wrong: wrong.map(percent),
         spot: pictures.worst_spot,
-        files: pictures
-            .files()
-            .map(|(kind, file)| (kind, url(file)))
-            .collect(),
+        files: pictures.files().map(|(kind, file)| (kind, url(file))).collect(),
     };
     let results = page.report.results.iter().zip(page.pictures);
     let items = std::iter::once(item("Truth", None, page.truth))
         .chain(results.map(|(r, p)| item(&r.shadows, r.metrics.wrong_fraction, p)));
-    let data = Data {
-        size: page.report.size,
-        kinds,
-        items: items.collect(),
-    };
+    let data = Data { size: page.report.size, kinds, items: items.collect() };
     // A string in it might close the element or open a comment.
     Ok(serde_json::to_string(&data)?.replace('<', "\\u003c"))
 }
@@ -405,11 +323,7 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
 fn url(file: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
     let escape = |b: u8| {
-        if plain(b) {
-            char::from(b).to_string()
-        } else {
-            format!("%{b:02X}")
-        }
+        if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }
     };
     file.bytes().map(escape).collect()
 }

@@ -2,7 +2,10 @@
 //! enough to look at, and with a known place for everything.
 
 use std::path::Path;
-use umbrage_measure::*;
+use umbrage_measure::{
+    ErrorScale, Image, LightInfo, Measured, Page, Report, Rgb, Seen, SeenTruth, Times, Truth, View,
+    measure, measure_error_px, write_pictures, write_report, write_truth_pictures,
+};
 
 type V = [f32; 3];
 
@@ -85,7 +88,8 @@ const TECHNIQUES: [Technique; 5] = [
 fn shade(sample: &Sample, visibility: f32) -> Rgb {
     let to_sun = unit(add([0.0; 3], SUN_TRAVELS, -1.0));
     let sun = dot(sample.normal, to_sun).max(0.0) * visibility;
-    let base = if sample.normal == [0.0, 1.0, 0.0] { [0.72, 0.68, 0.60] } else { [0.78, 0.42, 0.30] };
+    let base =
+        if sample.normal == [0.0, 1.0, 0.0] { [0.72, 0.68, 0.60] } else { [0.78, 0.42, 0.30] };
     let sky = 0.30 + 0.12 * sample.normal[1];
     let tint = [sky * 0.85 + sun * 0.80, sky * 0.95 + sun * 0.74, sky * 1.2 + sun * 0.62];
     std::array::from_fn(|i| ((base[i] * tint[i]).min(1.0).powf(1.0 / 2.2) * 255.0) as u8)
@@ -135,8 +139,8 @@ fn look_up(samples: &Image<Option<Sample>>, technique: &Technique) -> (Image<f32
     (samples.map(lit), samples.map(error))
 }
 
-/// Writes a report with `n` results into `folder`. The first five differ, further ones repeat them.
-pub fn write(folder: &Path, size: [u32; 2], n: usize, scene: &str, notices: &[String]) {
+/// The world with `n` results. The first five differ, further ones repeat them under other names.
+pub(crate) fn spheres_on_a_plane(size: [u32; 2], n: usize) -> Compared {
     let samples = first_hits(size);
     let to_sun = unit(add([0.0; 3], SUN_TRAVELS, -1.0));
     let counted = samples.map(|s| s.as_ref().is_some_and(|s| dot(s.normal, to_sun) > 0.0));
@@ -145,67 +149,121 @@ pub fn write(folder: &Path, size: [u32; 2], n: usize, scene: &str, notices: &[St
         Some(s) => f32::from(hit(add(s.point, s.normal, 1e-3), to_sun).is_none()),
         None => 1.0,
     });
-    let color = picture(&samples, &visibility);
-    let truth = SeenTruth { color: &color, visibility: &visibility, counted: &counted };
-    let truth_pictures = write_truth_pictures(folder, &truth).unwrap();
-
-    let scale = ErrorScale::default();
-    let (mut results, mut pictures) = (Vec::new(), Vec::new());
-    for i in 0..n {
-        let technique = &TECHNIQUES[i % TECHNIQUES.len()];
-        let name = match i / TECHNIQUES.len() {
-            0 => technique.name.to_owned(),
-            round => technique.name.replace("1024", &(1024 >> round).to_string()),
-        };
-        let (seen, error) = look_up(&samples, technique);
-        let color = picture(&samples, &seen);
-        results.push(Measured {
-            shadows: name.clone(),
-            backend: "reference".to_owned(),
-            maps: 1 + u32::from(name.contains("z2")),
-            texels: 1024 * 1024,
-            metrics: measure(&visibility, &seen, &counted).unwrap(),
-            error_px: measure_error_px(&error, &counted).unwrap(),
-            storage_factor: Some([865_159.0, 865.2, 12.4, 31.8, 6.0][i % 5]),
-            ms: Times {
-                plan: Some(0.004 + i as f64 / 1000.0),
-                depth: Some(812.5 - i as f64),
-                filter: None,
-                shade: Some(95.3),
-            },
-        });
-        let seen = Seen {
-            color: &color,
-            visibility: &seen,
-            error_px: &error,
-            partition: None,
-            texels: None,
-        };
-        pictures.push(write_pictures(folder, i + 1, &name, &seen, &truth, scale).unwrap());
+    let techniques: Vec<Pictured> = TECHNIQUES
+        .iter()
+        .map(|technique| {
+            let (visibility, error_px) = look_up(&samples, technique);
+            let color = picture(&samples, &visibility);
+            Pictured { name: technique.name.to_owned(), color, visibility, error_px }
+        })
+        .collect();
+    let named = |i: usize| {
+        let technique = techniques[i % techniques.len()].clone();
+        let texels = (1024 >> (i / techniques.len())).to_string();
+        Pictured { name: technique.name.replace("1024", &texels), ..technique }
+    };
+    Compared {
+        scene: "Spheres on a plane".to_owned(),
+        color: picture(&samples, &visibility),
+        visibility,
+        counted,
+        results: (0..n).map(named).collect(),
     }
-    let report = Report {
-        scene: scene.to_owned(),
-        size,
-        view: View {
-            name: None,
-            eye: EYE.map(f64::from),
-            target: [0.0, 0.86, 0.0],
-            up: [0.0, 1.0, 0.0],
-            fov: 57.6,
-            near: 0.1,
-            far: 300.0,
-        },
-        light: LightInfo::Directional { name: None, direction: to_sun.map(|v| -f64::from(v)) },
-        truth: Truth { rays_per_pixel: 16, seconds: Some(12.34) },
-        results,
+}
+
+/// A truth all of one colour, and techniques all of others; the truth is lit everywhere, the techniques
+/// nowhere.
+pub(crate) fn flat(size: [u32; 2], truth: Rgb, results: &[(&str, Rgb)]) -> Compared {
+    let all = |color| Image::from_fn(size, |_, _| color).unwrap();
+    let result = |&(name, color): &(&str, Rgb)| {
+        let color = all(color);
+        let (visibility, error_px) = (color.map(|_| 0.0), color.map(|_| 8.0));
+        Pictured { name: name.to_owned(), color, visibility, error_px }
     };
-    let page = Page {
-        report: &report,
-        truth: &truth_pictures,
-        pictures: &pictures,
-        scale,
-        notices,
-        command: Some("umbrage compare spheres --shadows uniform@1024 --shadows lispsm@1024 -o report"),
-    };
-    write_report(folder, &page).unwrap();
+    let color = all(truth);
+    Compared {
+        scene: "Flat".to_owned(),
+        visibility: color.map(|_| 1.0),
+        counted: color.map(|_| true),
+        color,
+        results: results.iter().map(result).collect(),
+    }
+}
+
+/// All that goes into a report.
+pub(crate) struct Compared {
+    pub(crate) scene: String,
+    pub(crate) color: Image<Rgb>,
+    pub(crate) visibility: Image<f32>,
+    pub(crate) counted: Image<bool>,
+    pub(crate) results: Vec<Pictured>,
+}
+
+/// What one technique shows.
+#[derive(Clone)]
+pub(crate) struct Pictured {
+    pub(crate) name: String,
+    pub(crate) color: Image<Rgb>,
+    pub(crate) visibility: Image<f32>,
+    pub(crate) error_px: Image<f32>,
+}
+
+impl Compared {
+    /// Writes the report into `folder` and returns its figures.
+    pub(crate) fn write(&self, folder: &Path, notices: &[String]) -> Report {
+        let Self { color, visibility, counted, .. } = self;
+        let truth = SeenTruth { color, visibility, counted };
+        let truth_pictures = write_truth_pictures(folder, &truth).unwrap();
+        let scale = ErrorScale::default();
+        let (mut results, mut pictures) = (Vec::new(), Vec::new());
+        for (i, Pictured { name, color, visibility, error_px }) in self.results.iter().enumerate() {
+            let seen = Seen { color, visibility, error_px, partition: None, texels: None };
+            pictures.push(write_pictures(folder, i + 1, name, &seen, &truth, scale).unwrap());
+            results.push(Measured {
+                shadows: name.clone(),
+                backend: "reference".to_owned(),
+                maps: 1 + u32::from(name.contains("z2")),
+                texels: 1 << 20,
+                metrics: measure(truth.visibility, visibility, counted).unwrap(),
+                error_px: measure_error_px(error_px, counted).unwrap(),
+                // One unknown figure, to be told from zero.
+                storage_factor: [Some(865_159.0), Some(865.2), None, Some(31.8), Some(6.0)][i % 5],
+                ms: Times {
+                    plan: Some(0.004 + i as f64 / 1000.0),
+                    depth: Some(812.5 - i as f64),
+                    filter: None,
+                    shade: Some(95.3),
+                },
+            });
+        }
+        let report = Report {
+            scene: self.scene.clone(),
+            size: color.size(),
+            view: View {
+                name: None,
+                eye: EYE.map(f64::from),
+                target: [0.0, 0.86, 0.0],
+                up: [0.0, 1.0, 0.0],
+                fov: 57.6,
+                near: 0.1,
+                far: 300.0,
+            },
+            light: LightInfo::Directional {
+                name: None,
+                direction: unit(SUN_TRAVELS).map(f64::from),
+            },
+            truth: Truth { rays_per_pixel: 16, seconds: Some(12.34) },
+            results,
+        };
+        let page = Page {
+            report: &report,
+            truth: &truth_pictures,
+            pictures: &pictures,
+            scale,
+            notices,
+            command: Some("umbrage compare spheres --shadows uniform --shadows lispsm -o report"),
+        };
+        write_report(folder, &page).unwrap();
+        report
+    }
 }
