@@ -160,7 +160,7 @@ mod tests {
         let picture = image([4, 1], &[[200; 3]; 4]);
         let scale = ErrorScale::default();
         let map = error_map(&error, &counted, &picture, scale).unwrap();
-        let expected = [scale.color(1.0).unwrap(), scale.color(8.0).unwrap(), [90; 3], [64; 3]];
+        let expected = [scale.color(1.0).unwrap(), scale.color(8.0).unwrap(), [90; 3], [54; 3]];
         assert_eq!(map.pixels(), expected);
         assert!(error_map(&error, &image([1, 1], &[true]), &picture, scale).is_err());
     }

@@ -138,3 +138,106 @@ impl Report {
         Ok(serde_json::from_str(text)?)
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    /// A report with a result of each given share of wrong pixels; `None`: nothing counted.
+    pub(crate) fn report(wrong: &[Option<f64>]) -> Report {
+        let result = |(i, &wrong): (usize, &Option<f64>)| Measured {
+            shadows: format!("lambda={i}@1024"),
+            backend: "reference".to_owned(),
+            maps: 1,
+            texels: 1 << 40,
+            metrics: Metrics {
+                counted: if wrong.is_some() { 1000 } else { 0 },
+                wrong_fraction: wrong,
+                false_light: wrong,
+                false_shadow: wrong.map(|_| 0.0),
+                mean_abs_error: wrong,
+                flip: wrong,
+            },
+            error_px: ErrorPx {
+                p50: Some(0.1 + 0.2),
+                p95: Some(2.0),
+                max: Some(3.5),
+                undefined: 7,
+            },
+            storage_factor: Some(865.16),
+            ms: Times { plan: Some(0.004), depth: Some(812.5), filter: None, shade: Some(95.25) },
+        };
+        Report {
+            scene: "pole".to_owned(),
+            size: [64, 48],
+            view: View {
+                name: None,
+                eye: [0.0, 2.0, 0.0],
+                target: [0.0, 2.0, -1.0],
+                up: [0.0, 1.0, 0.0],
+                fov: 60.0,
+                near: 0.1,
+                far: 500.0,
+            },
+            light: LightInfo::Directional { name: None, direction: [0.0, -1.0, 0.0] },
+            truth: Truth { rays_per_pixel: 16, seconds: Some(1.25) },
+            results: wrong.iter().enumerate().map(result).collect(),
+        }
+    }
+
+    #[test]
+    fn json_has_the_promised_shape() {
+        let text = report(&[Some(0.25)]).to_json().unwrap();
+        let json: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["scene"], "pole");
+        assert_eq!(json["size"], json!([64, 48]));
+        assert_eq!(
+            json["light"],
+            json!({"kind": "directional", "name": null, "direction": [0.0, -1.0, 0.0]})
+        );
+        assert_eq!(json["truth"], json!({"rays_per_pixel": 16, "seconds": 1.25}));
+        assert_eq!(json["view"]["fov"], 60.0);
+        let expected = json!({
+            "shadows": "lambda=0@1024", "backend": "reference", "maps": 1, "texels": 1_u64 << 40,
+            "counted_pixels": 1000, "wrong_fraction": 0.25, "false_light": 0.25, "false_shadow": 0.0,
+            "mean_abs_error": 0.25, "flip": 0.25,
+            "error_px": {"p50": 0.1 + 0.2, "p95": 2.0, "max": 3.5, "undefined": 7},
+            "storage_factor": 865.16,
+            "ms": {"plan": 0.004, "depth": 812.5, "filter": null, "shade": 95.25},
+        });
+        assert_eq!(json["results"], json!([expected]));
+    }
+
+    #[test]
+    fn json_comes_back_to_the_bit() {
+        let mut original = report(&[Some(1.0 / 3.0), None, Some(f64::MIN_POSITIVE)]);
+        original.light = LightInfo::Spot {
+            name: Some("lamp \"1\"".to_owned()),
+            position: [1e5, 0.1, -0.3],
+            direction: [0.6, -0.8, 0.0],
+            half_angle: 30.0,
+            range: 12.0,
+        };
+        assert_eq!(Report::from_json(&original.to_json().unwrap()).unwrap(), original);
+    }
+
+    #[test]
+    fn figures_that_are_not_finite_become_null() {
+        let mut odd = report(&[Some(f64::NAN)]);
+        odd.results[0].storage_factor = Some(f64::INFINITY);
+        odd.results[0].error_px.max = Some(f64::NEG_INFINITY);
+        let read = Report::from_json(&odd.to_json().unwrap()).unwrap();
+        assert_eq!(read.results[0].metrics.wrong_fraction, None);
+        assert_eq!(read.results[0].storage_factor, None);
+        assert_eq!(read.results[0].error_px.max, None);
+    }
+
+    #[test]
+    fn broken_json_is_told_apart() {
+        let text = report(&[]).to_json().unwrap().replace("\"rays_per_pixel\"", "\"rays\"");
+        let error = Report::from_json(&text).unwrap_err().to_string();
+        assert!(error.contains("rays_per_pixel") && error.contains("line"), "{error}");
+        assert!(Report::from_json("").is_err());
+    }
+}

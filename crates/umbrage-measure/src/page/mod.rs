@@ -68,3 +68,37 @@ fn check(folder: &Path, page: &Page<'_>) -> Result<(), Error> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::report;
+
+    #[test]
+    fn incomplete_reports_are_refused_and_leave_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let there = Pictures {
+            color: "there.png".to_owned(),
+            visibility: "there.png".to_owned(),
+            ..Pictures::default()
+        };
+        write_file(folder.path().join("there.png"), b"").unwrap();
+        let gone = Pictures { error: Some("gone.png".to_owned()), ..there.clone() };
+        let write = |results: usize, pictures: &[Pictures]| {
+            let report = &report(&vec![Some(0.5); results]);
+            let scale = ErrorScale::default();
+            let page = Page { report, truth: &there, pictures, scale, notices: &[], command: None };
+            write_report(folder.path(), &page).map_err(|e| e.to_string())
+        };
+        assert_eq!(write(0, &[]).unwrap_err(), "report.results: must not be empty");
+        let one_too_few = "pictures: must be one set a result (2), are 1";
+        assert_eq!(write(2, std::slice::from_ref(&there)).unwrap_err(), one_too_few);
+        assert!(write(1, &[gone]).unwrap_err().starts_with("pictures: gone.png is not in "));
+        assert!(!folder.path().join("report.json").exists());
+        write(1, std::slice::from_ref(&there)).unwrap();
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().file_name()).collect();
+        files.sort();
+        assert_eq!(files, ["index.html", "report.json", "there.png"]);
+    }
+}

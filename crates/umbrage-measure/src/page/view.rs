@@ -214,7 +214,7 @@ fn label(kind: &str) -> &'static str {
         "color" => "Picture",
         "visibility" => "Visibility",
         "difference" => "Difference",
-        "error" => "Pixels per texel",
+        "error" => "Error map",
         "partition" => "Maps",
         _ => "Texels",
     }
@@ -326,4 +326,55 @@ fn url(file: &str) -> String {
         if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }
     };
     file.bytes().map(escape).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::tests::report;
+
+    #[test]
+    fn finding_says_who_comes_closest() {
+        let say = |wrong: &[Option<f64>]| {
+            let report = report(wrong);
+            let finding = finding(&report, best(&report));
+            format!("{} {}", finding.name, finding.rest)
+        };
+        assert_eq!(
+            say(&[Some(0.2), Some(0.05), Some(0.1)]),
+            "lambda=1@1024 comes closest to the truth: 5.00 % of the counted pixels are wrong. \
+             lambda=0@1024 gets 4.00 times as many."
+        );
+        assert_eq!(
+            say(&[Some(0.2), Some(0.0)]),
+            "lambda=1@1024 comes closest to the truth: no counted pixel is wrong; lambda=0@1024 gets \
+             20.0 % wrong."
+        );
+        assert_eq!(say(&[Some(0.5)]), "lambda=0@1024 shows 50.0 % of the counted pixels wrong.");
+        assert!(say(&[Some(0.1), Some(0.1)]).ends_with("wrong, as with all the others."));
+        assert!(say(&[Some(0.0), Some(0.0)]).contains(": 0 % of the counted pixels are wrong"));
+        assert!(say(&[None, None]).contains("nothing to measure"));
+    }
+
+    #[test]
+    fn data_cannot_leave_its_element() {
+        let mut report = report(&[Some(0.5)]);
+        report.results[0].shadows = "</script><!--".to_owned();
+        let pictures = [Pictures { color: "a b:c?.png".to_owned(), ..Pictures::default() }];
+        let truth = Pictures::default();
+        let scale = crate::ErrorScale::default();
+        let page = Page {
+            report: &report,
+            truth: &truth,
+            pictures: &pictures,
+            scale,
+            notices: &[],
+            command: None,
+        };
+        let data = data(&page, &kinds(&pictures)).unwrap();
+        assert!(!data.contains('<'), "{data}");
+        let json: serde_json::Value = serde_json::from_str(&data).unwrap();
+        assert_eq!(json["items"][1]["name"], "</script><!--");
+        assert_eq!(json["items"][1]["files"]["color"], "a%20b%3Ac%3F.png");
+    }
 }
