@@ -4,7 +4,7 @@ use crate::args;
 use crate::output::{ReportFolder, note, print};
 use crate::pixels::{self, Shadowed, Texels, counted, milliseconds};
 use crate::progress::Progress;
-use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene};
+use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene, tell_notices};
 use crate::spec::Technique;
 use anyhow::{Context, Result};
 use std::fmt::Write;
@@ -45,7 +45,6 @@ struct Picture {
 /// Compares, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output)?;
-    args.execution.announce();
     let scene = open_scene(&args.scene.name)?;
     let onlooker = onlooker(&args.view, Some(&scene))?;
     let lamp = lamp(&args.light, Some(&scene))?;
@@ -62,6 +61,8 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let rows_of_maps: u64 =
         plans.iter().zip(&args.shadows).map(|((plan, _), t)| Reference::rows(plan, t.filter)).sum();
     let height = u64::from(onlooker.camera.image()[1]);
+    tell_notices(&scene);
+    args.execution.announce();
     let progress = Progress::new(rows_of_maps + height * (2 + plans.len() as u64), quiet);
     let mut contenders = Vec::new();
     for (technique, (plan, ms)) in args.shadows.iter().zip(&plans) {
@@ -79,7 +80,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
         notices.push("Alpha masks are ignored: masked materials show and cast as solid.".into());
     }
     let mut report = Report {
-        scene: args.scene.name.clone(),
+        scene: scene.name.clone(),
         size,
         view: view_info(&onlooker),
         light: light_info(&lamp),

@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::output::print;
-use crate::setup::{Onlooker, lamp, onlooker, open_scene, option_error};
+use crate::setup::{Onlooker, lamp, onlooker, open_scene, option_error, tell_notices};
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;
@@ -43,6 +43,9 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let scene = args.scene.as_deref().map(open_scene).transpose()?;
     let onlooker = onlooker(&args.view, scene.as_ref())?;
     let lamp = lamp(&args.light, scene.as_ref())?;
+    if let Some(scene) = &scene {
+        tell_notices(scene);
+    }
     let bounds = scene.map_or_else(Bounds::default, |s| Bounds::of_scene(s.bounds()));
     let mut planner = Planner::new();
     let plan = planner

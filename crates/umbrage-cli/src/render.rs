@@ -4,7 +4,7 @@ use crate::args::{self, Aov, PictureKind};
 use crate::output::check_file;
 use crate::pixels::{self, Shadowed, Texels, counted, linear_color, middles};
 use crate::progress::Progress;
-use crate::setup::{lamp, onlooker, open_scene};
+use crate::setup::{lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use glam::DVec3;
 use umbrage::Bounds;
@@ -33,7 +33,6 @@ struct Layers {
 pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let kind = args.picture_kind()?;
     check_file(&args.output)?;
-    args.execution.announce();
     let scene = open_scene(&args.scene.name)?;
     let camera = onlooker(&args.view, Some(&scene))?.camera;
     let light = lamp(&args.light, Some(&scene))?.light;
@@ -48,6 +47,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let filter = args.shadows.filter;
     let map_rows = if needs_map { Reference::rows(&plan, filter) } else { 0 };
     let passes = 1 + u64::from(needs_truth) + u64::from(needs_map);
+    tell_notices(&scene);
+    args.execution.announce();
     let progress = Progress::new(map_rows + height * passes, quiet);
     let advance = |rows| progress.advance(rows);
 

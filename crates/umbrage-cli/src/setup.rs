@@ -34,9 +34,6 @@ pub(crate) struct Lamp {
 /// The scene of this name: a file if there is one, else a built-in scene, `name` or `name:size`.
 pub(crate) fn open_scene(name: &str) -> Result<Scene> {
     let scene = read_scene(name)?;
-    for notice in &scene.notices {
-        log::warn!("{name}: {}", notice.0);
-    }
     ensure!(scene.drawn_triangles() > 0, "SCENE: {name} has no triangles to draw");
     log::info!(
         "{name}: {} triangles drawn, {} stored, {} cameras, {} lights",
@@ -46,6 +43,13 @@ pub(crate) fn open_scene(name: &str) -> Result<Scene> {
         scene.lights.len(),
     );
     Ok(scene)
+}
+
+/// Says what was repaired on loading.
+pub(crate) fn tell_notices(scene: &Scene) {
+    for notice in &scene.notices {
+        log::warn!("{}: {}", scene.name, notice.0);
+    }
 }
 
 fn read_scene(name: &str) -> Result<Scene> {

@@ -1,0 +1,240 @@
+//! Whatever is wrong: one line that says what, a failing exit code, nothing on standard output, and
+//! no file left behind.
+
+use crate::desk::{Desk, STAGE_GLTF};
+
+/// A desk with things to trip over.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("stage.gltf", STAGE_GLTF);
+    desk.write("broken.glb", "glTF but not really");
+    desk.write("empty.gltf", r#"{"asset": {"version": "2.0"}}"#);
+    desk.write("file", "");
+    std::fs::create_dir(desk.path("full")).unwrap();
+    desk.write("full/thesis.tex", "precious");
+    std::fs::create_dir(desk.path("folder.png")).unwrap();
+    desk
+}
+
+fn refuses(desk: &Desk, args: &[&str], expected: &str) {
+    let before = desk.listing();
+    let run = desk.run(args);
+    assert!(run.code == 1 || run.code == 2, "{args:?}: exit code {}", run.code);
+    assert_eq!(run.stdout, "", "{args:?}");
+    assert!(run.stderr.contains(expected), "{args:?}: {expected:?} is not in {}", run.stderr);
+    assert_eq!(run.stderr.trim_end().lines().count(), 1, "{args:?}: {}", run.stderr);
+    assert!(run.stderr.starts_with("umbrage: "), "{args:?}: {}", run.stderr);
+    assert_eq!(desk.listing(), before, "{args:?}");
+}
+
+/// Commands that work, for options that do not.
+const RENDER: [&str; 4] = ["render", "pole", "-o", "p.png"];
+const COMPARE: [&str; 4] = ["compare", "pole", "-o", "report"];
+const PLAN: [&str; 2] = ["plan", "pole"];
+
+#[test]
+fn shared_options() {
+    let desk = desk();
+    for (options, expected) in [
+        (&["--eye", "1,2"][..], "--eye"),
+        (&["--eye", "1,2"], "three numbers"),
+        (&["--eye", "1,2,NaN"], "within 1e12"),
+        (&["--eye", "0,0,1e300"], "within 1e12"),
+        (&["--eye"], "--eye"),
+        (&["--eye", "--target", "0,0,0"], "0,0,0"),
+        (&["--target", "a,b,c"], "--target"),
+        (&["--eye", "1,2,3", "--target", "1,2,3"], "--target: must differ from --eye"),
+        (&["--up", "0,0,0"], "--up"),
+        (&["--up", "0,0,0"], "must point somewhere"),
+        (&["--fov", "0"], "--fov"),
+        (&["--fov", "180"], "0.01 to 179 degrees"),
+        (&["--fov", "-60"], "0.01 to 179 degrees"),
+        (&["--fov", "wide"], "0.01 to 179 degrees"),
+        (&["--near", "0"], "--near"),
+        (&["--near", "-1"], "positive number of metres"),
+        (&["--near", "inf"], "positive number of metres"),
+        (&["--far", "nan"], "--far"),
+        (&["--near", "5", "--far", "5"], "--far: must exceed --near (5)"),
+        (&["--near", "1e9"], "--far: must exceed --near"),
+        (&["--size", "0x10"], "--size"),
+        (&["--size", "100"], "WIDTHxHEIGHT"),
+        (&["--size", "99999x99999"], "1 to 16384 pixels"),
+        (&["--size", "-5x5"], "1 to 16384 pixels"),
+        (&["--camera", "front"], "--camera: the scene has no camera `front`"),
+        (&["--camera", "front", "--eye", "0,0,0"], "cannot be used with"),
+        (&["--sun", "0,0,0"], "--sun"),
+        (&["--sun", "0,0,0"], "must point somewhere"),
+        (&["--sun", "down"], "three numbers"),
+        (&["--light", "moon"], "--light: the scene has no light `moon`"),
+        (&["--light", "moon", "--sun", "0,-1,0"], "cannot be used with"),
+        (&["--shadows", ""], "--shadows"),
+        (&["--shadows", "lipsm"], "did you mean `lispsm`?"),
+        (&["--shadows", "uniform:pfc3"], "did you mean `pcfN`?"),
+        (&["--shadows", "uniform+fase"], "did you mean `+face`?"),
+        (&["--shadows", "uniform@0"], "from 1 to 16384"),
+        (&["--shadows", "uniform@99999"], "from 1 to 16384"),
+        (&["--shadows", "uniform:pcf99"], "from 1 to 15"),
+        (&["--shadows", "lambda=-2"], "positive"),
+        (&["--shadows", "lispsm+z4"], "not available in this version"),
+        (&["--shadows", "lispsm+face"], "not available in this version"),
+        (&["--shadows", "lispsm:vsm"], "not available in this version"),
+        (&["--shadows", "lispsm:csm8(blur=7,offset)"], "not available in this version"),
+        (&["--shadwos", "uniform"], "'--shadwos'"),
+    ] {
+        for command in [&RENDER[..], &COMPARE, &PLAN] {
+            refuses(&desk, &[command, options].concat(), expected);
+        }
+    }
+}
+
+#[test]
+fn options_of_some_commands() {
+    let desk = desk();
+    for (args, expected) in [
+        (&["render"][..], "<SCENE>"),
+        (&["render", "pole"], "--output"),
+        (&["compare", "pole"], "--output"),
+        (&["rendr", "pole"], "'rendr'"),
+        (&["scenes", "pole"], "'pole'"),
+        (&["render", "pole", "-o", "p.png", "--samples", "0"], "1..=16"),
+        (&["compare", "pole", "-o", "r", "--samples", "17"], "1..=16"),
+        (&["render", "pole", "-o", "p.png", "--aov", "colour"], "color"),
+        (&["render", "pole", "-o", "p.png", "--backend", "gpu"], "--backend: gpu is not built"),
+        (&["compare", "pole", "-o", "r", "--backend", "gpu"], "--backend: gpu is not built"),
+        (
+            &["compare", "pole", "-o", "r", "--backend", "cuda"],
+            "[possible values: auto, gpu, reference]",
+        ),
+        (
+            &["compare", "pole", "-o", "r", "--shadows", "psm", "--shadows", "psm"],
+            "`psm` is given twice",
+        ),
+        (
+            &["render", "pole", "-o", "p.png", "--shadows", "psm", "--shadows", "tsm"],
+            "cannot be used multiple times",
+        ),
+        (&["plan"], "--eye is needed"),
+        (&["plan", "--eye", "0,0,0"], "--target is needed"),
+        (&["plan", "--eye", "0,0,0", "--target", "0,0,1", "--far", "9"], "--near is needed"),
+        (&["plan", "--eye", "0,0,0", "--target", "0,0,1", "--near", "1"], "--far is needed"),
+        (
+            &[
+                "plan", "--eye", "0,0,0", "--target", "0,0,1", "--near", "1", "--far", "9",
+                "--light", "x",
+            ],
+            "--light names something of a scene",
+        ),
+    ] {
+        refuses(&desk, args, expected);
+    }
+}
+
+#[test]
+fn scenes() {
+    let desk = desk();
+    for (scene, expected) in [
+        ("", "SCENE"),
+        ("plole", "did you mean `pole`?"),
+        ("pole:", "whole number, as in pole:10"),
+        ("pole:many", "whole number, as in pole:10"),
+        ("pole:0", "sizes 1 to"),
+        ("pole:-1", "whole number"),
+        ("pole:99999999999999", "whole number"),
+        ("missing.glb", "there is no file missing.glb"),
+        ("no/such.gltf", "there is no file no/such.gltf"),
+        ("broken.glb", "broken.glb"),
+        ("empty.gltf", "empty.gltf"),
+        ("file", "file"),
+        ("full", "full is a folder"),
+    ] {
+        for command in [
+            &["render", scene, "-o", "p.png"][..],
+            &["compare", scene, "-o", "r"],
+            &["plan", scene],
+        ] {
+            refuses(&desk, command, expected);
+        }
+    }
+}
+
+#[test]
+fn names_of_a_scenes_cameras_and_lights() {
+    let desk = desk();
+    for (option, name, expected) in [
+        ("--camera", "back", "--camera: the scene has no camera `back`; there are front, above"),
+        ("--light", "moon", "--light: the scene has no light `moon`; there are noon, torch, bulb"),
+        ("--light", "bulb", "--light: `bulb` is a point light"),
+    ] {
+        for command in [
+            &["render", "stage.gltf", "-o", "p.png"][..],
+            &["compare", "stage.gltf", "-o", "r"],
+            &["plan", "stage.gltf"],
+        ] {
+            refuses(&desk, &[command, &[option, name]].concat(), expected);
+        }
+    }
+}
+
+#[test]
+fn places_to_write_to() {
+    let desk = desk();
+    for (output, expected) in [
+        ("p.jpg", "must end in .png or .exr"),
+        ("p", "must end in .png or .exr"),
+        ("missing/p.png", "the folder missing must exist"),
+        ("file/p.png", "file is not a folder"),
+        ("folder.png", "folder.png is a folder"),
+    ] {
+        refuses(&desk, &["render", "pole", "-o", output], expected);
+    }
+    for (output, expected) in [
+        ("missing/report", "the folder missing must exist"),
+        ("file", "file is there and is not a folder"),
+        ("file/report", "file is not a folder"),
+        ("full", "full holds something other than a report"),
+        (".", "has no name of its own"),
+        ("..", "has no name of its own"),
+    ] {
+        refuses(&desk, &["compare", "pole", "-o", output], expected);
+    }
+    assert_eq!(std::fs::read_to_string(desk.path("full/thesis.tex")).unwrap(), "precious");
+}
+
+/// Where not even the superuser can write.
+#[cfg(target_os = "linux")]
+#[test]
+fn places_that_cannot_be_written() {
+    let desk = desk();
+    refuses(&desk, &["render", "pole", "-o", "/proc/p.png"], "--output: cannot write in /proc");
+    refuses(&desk, &["compare", "pole", "-o", "/proc/report"], "--output: cannot write in /proc");
+}
+
+/// Any text in any place is answered, never with a panic.
+#[test]
+fn no_argument_panics() {
+    let desk = desk();
+    let odd = [
+        "",
+        "-",
+        "--",
+        "\u{1F333}",
+        "0",
+        "-0",
+        "1e999",
+        "NaN,NaN,NaN",
+        ",,,",
+        "a=b",
+        "@@@",
+        "((((",
+        "\t\n",
+    ];
+    for option in
+        ["--eye", "--up", "--fov", "--near", "--size", "--sun", "--light", "--camera", "--shadows"]
+    {
+        for value in odd {
+            let run = desk.run(&["plan", "pole", option, value]);
+            assert!([0, 1, 2].contains(&run.code), "{option} {value:?}: {}", run.stderr);
+            assert!(!run.stderr.contains("panicked"), "{option} {value:?}: {}", run.stderr);
+        }
+    }
+}

@@ -1,0 +1,234 @@
+use crate::desk::{Desk, keys, listing, shared_scene};
+use serde_json::Value;
+
+const SMALL: [&str; 2] = ["--size", "96x54"];
+
+#[test]
+fn the_report_has_all_that_is_documented() {
+    let desk = Desk::new();
+    let json = desk.json(
+        &[
+            &[
+                "compare",
+                "pole",
+                "-o",
+                "report",
+                "--json",
+                "--shadows",
+                "uniform@64",
+                "--shadows",
+                "lispsm:pcf3@64x32",
+            ],
+            &SMALL[..],
+        ]
+        .concat(),
+    );
+    let file: Value =
+        serde_json::from_str(&std::fs::read_to_string(desk.path("report/report.json")).unwrap())
+            .unwrap();
+    assert_eq!(json, file);
+    assert_eq!(keys(&json), ["light", "results", "scene", "size", "truth", "view"]);
+    assert_eq!(json["scene"], "pole");
+    assert_eq!(json["size"], serde_json::json!([96, 54]));
+    assert_eq!(json["truth"]["rays_per_pixel"], 1);
+    assert!(json["truth"]["seconds"].as_f64().unwrap() > 0.0);
+    let results = json["results"].as_array().unwrap();
+    assert_eq!(results.len(), 2);
+    assert_eq!(results[0]["shadows"], "uniform@64");
+    assert_eq!(results[1]["shadows"], "lispsm:pcf3@64x32");
+    assert_eq!(results[1]["texels"], 64 * 32);
+    for result in results {
+        assert_eq!(result["backend"], "reference");
+        assert_eq!(result["maps"], 1);
+        for figure in ["wrong_fraction", "mean_abs_error", "flip", "storage_factor"] {
+            assert!(result[figure].as_f64().unwrap() >= 0.0, "{figure}");
+        }
+        let [p50, p95, max] =
+            ["p50", "p95", "max"].map(|p| result["error_px"][p].as_f64().unwrap());
+        assert!(0.0 < p50 && p50 <= p95 && p95 <= max, "{result}");
+        assert_eq!(keys(&result["ms"]), ["depth", "filter", "plan", "shade"]);
+        for stage in ["plan", "depth", "shade"] {
+            assert!(result["ms"][stage].as_f64().unwrap() > 0.0, "{stage}");
+        }
+    }
+    // 64² texels are too few for this view, but not for anyone to call it wrong everywhere.
+    let wrong = results[0]["wrong_fraction"].as_f64().unwrap();
+    assert!((1e-4..0.3).contains(&wrong), "{wrong}");
+
+    let names = listing(&desk.path("report"));
+    let pngs: Vec<&String> = names.iter().filter(|n| n.ends_with(".png")).collect();
+    assert!(names.iter().any(|n| n == "index.html"));
+    let page = std::fs::read_to_string(desk.path("report/index.html")).unwrap();
+    for png in &pngs {
+        let picture = image::open(desk.path("report").join(png)).unwrap();
+        assert_eq!((picture.width(), picture.height()), (96, 54), "{png}");
+        assert!(page.contains(png.as_str()), "{png}");
+    }
+    for shown in ["truth-color", "uniform-64-difference", "lispsm-pcf3-64x32-error"] {
+        assert!(pngs.iter().any(|n| n.contains(shown)), "{shown}: {pngs:?}");
+    }
+    for loads in ["src=\"http", "href=\"http", "url(http", "@import"] {
+        assert!(!page.contains(loads), "the page must open offline, not load {loads}");
+    }
+    assert_eq!(desk.listing(), ["report"]);
+}
+
+#[test]
+fn the_figures_are_those_of_the_pictures() {
+    let desk = Desk::new();
+    let view = ["pole", "--size", "160x90", "--shadows", "uniform@48"];
+    let json = desk.json(&[&["compare", "-o", "report", "--json"], &view[..]].concat());
+    let luma = |path: &str| image::open(desk.path(path)).unwrap().to_luma8();
+    let (truth, map) =
+        (luma("report/truth-visibility.png"), luma("report/01-uniform-48-visibility.png"));
+    let wrong =
+        truth.pixels().zip(map.pixels()).filter(|(t, m)| t.0[0].abs_diff(m.0[0]) > 127).count();
+    let result = &json["results"][0];
+    let counted = result["counted_pixels"].as_f64().unwrap();
+    assert!(wrong > 0);
+    assert_eq!(result["wrong_fraction"].as_f64().unwrap(), wrong as f64 / counted);
+    // Another command, the same picture.
+    let render = ["render", "-o", "v.png", "--aov", "visibility", "--samples", "1"];
+    desk.succeed(&[&render[..], &view[..]].concat());
+    assert_eq!(luma("v.png"), map);
+    desk.succeed(
+        &[&["render", "-o", "t.png", "--aov", "truth", "--samples", "1"], &view[..]].concat(),
+    );
+    assert_eq!(luma("t.png"), truth);
+}
+
+#[test]
+fn more_texels_are_less_wrong() {
+    let desk = Desk::new();
+    let json = desk.json(
+        &[
+            &[
+                "compare",
+                "pole",
+                "-o",
+                "r",
+                "--json",
+                "--shadows",
+                "uniform@32",
+                "--shadows",
+                "uniform@256",
+                "--shadows",
+                "uniform@2048",
+            ],
+            &SMALL[..],
+        ]
+        .concat(),
+    );
+    let wrong: Vec<f64> = json["results"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|r| r["wrong_fraction"].as_f64().unwrap())
+        .collect();
+    assert!(wrong[0] > wrong[1] && wrong[1] >= wrong[2], "{wrong:?}");
+    assert!(wrong[2] < 0.01, "{wrong:?}");
+}
+
+#[test]
+fn the_table_lists_every_technique_and_the_report() {
+    let desk = Desk::new();
+    let table = desk.succeed(&["compare", "pole", "-o", "report", "--size", "32x18"]);
+    for technique in ["uniform", "psm", "lispsm", "tsm", "adaptive"] {
+        assert!(table.lines().any(|l| l.starts_with(technique)), "{table}");
+    }
+    assert!(table.ends_with("report: report/index.html\n"), "{table}");
+}
+
+#[test]
+fn a_former_report_is_replaced_and_nothing_else() {
+    let desk = Desk::new();
+    let run = |shadows| {
+        desk.run(&["compare", "pole", "-o", "report", "--size", "16x9", "--shadows", shadows])
+    };
+    assert_eq!(run("psm@16").code, 0);
+    assert_eq!(run("uniform@16").code, 0);
+    let names = listing(&desk.path("report"));
+    assert!(
+        names.iter().any(|n| n.contains("uniform")) && !names.iter().any(|n| n.contains("psm")),
+        "{names:?}"
+    );
+
+    desk.write("report/thesis.tex", "precious");
+    let refused = run("lispsm@16");
+    assert_ne!(refused.code, 0);
+    assert!(refused.stderr.contains("thesis.tex"), "{}", refused.stderr);
+    assert_eq!(std::fs::read_to_string(desk.path("report/thesis.tex")).unwrap(), "precious");
+    assert_eq!(listing(&desk.path("report")).len(), names.len() + 1);
+    assert_eq!(desk.listing(), ["report"]);
+}
+
+#[test]
+fn an_empty_folder_is_taken() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("report")).unwrap();
+    desk.succeed(&[
+        "compare",
+        "pole",
+        "-o",
+        "report/",
+        "--size",
+        "16x9",
+        "--shadows",
+        "uniform@16",
+    ]);
+    assert!(desk.path("report/index.html").is_file());
+}
+
+#[test]
+fn real_scenes_compare() {
+    // Of each kind one: cards with holes, instances, a room, a city, thirty kilometres of land.
+    for scene in [
+        "vehicles/kenney_racing_level.glb",
+        "dragon/dragons25_res3.glb",
+        "trees/forest_eztree.glb",
+        "city/delft_city.glb",
+        "terrain/jacksboro_dem_terrain.glb",
+        "atrium/sponza_atrium_reduced.glb",
+    ] {
+        let desk = Desk::new();
+        let path = shared_scene(scene);
+        let json = desk.json(
+            &[
+                &[
+                    "compare",
+                    &path,
+                    "-o",
+                    "report",
+                    "--json",
+                    "--shadows",
+                    "unfocused@256",
+                    "--shadows",
+                    "adaptive@1024",
+                ],
+                &SMALL[..],
+            ]
+            .concat(),
+        );
+        let figure = |i: usize, name: &str| json["results"][i][name].as_f64().unwrap();
+        assert!(figure(0, "counted_pixels") > 200.0, "{scene}: the sun must reach what is seen");
+        let [poor, good] = [0, 1].map(|i| figure(i, "wrong_fraction"));
+        assert!(good < poor && good < 0.2, "{scene}: {good} against {poor}");
+    }
+}
+
+#[test]
+fn without_arguments_five_techniques_are_compared() {
+    let desk = Desk::new();
+    let table = desk.succeed(&[]);
+    let json: Value =
+        serde_json::from_str(&std::fs::read_to_string(desk.path("report/report.json")).unwrap())
+            .unwrap();
+    let techniques: Vec<&str> = json["results"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|r| r["shadows"].as_str().unwrap())
+        .collect();
+    assert_eq!(techniques, ["uniform", "psm", "lispsm", "tsm", "adaptive"]);
+    assert!(table.contains("report: report/index.html"), "{table}");
+}

@@ -1,0 +1,10 @@
+//! The real binary, end to end.
+
+mod bad_input;
+mod compare;
+mod desk;
+mod goldens;
+mod help;
+mod plan;
+mod render;
+mod scenes;

@@ -1,0 +1,158 @@
+use crate::desk::{Desk, STAGE_GLTF, keys};
+use glam::{DMat4, DVec3, DVec4, Vec4Swizzles};
+use serde_json::Value;
+
+const VIEW: [&str; 15] = [
+    "plan",
+    "--eye",
+    "0,2,0",
+    "--target",
+    "0,2,-1",
+    "--fov",
+    "60",
+    "--near",
+    "0.1",
+    "--far",
+    "500",
+    "--size",
+    "1280x720",
+    "--sun",
+    "0.3,-1,0.2",
+];
+
+fn plan(shadows: &str) -> Value {
+    Desk::new().json(&[&VIEW[..], &["--shadows", shadows, "--json"]].concat())
+}
+
+fn matrix(map: &Value) -> DMat4 {
+    let columns: [[f64; 4]; 4] = serde_json::from_value(map["world_to_shadow"].clone()).unwrap();
+    DMat4::from_cols_array_2d(&columns)
+}
+
+#[test]
+fn json_has_the_documented_shape() {
+    let plan = plan("lispsm@1024");
+    assert_eq!(keys(&plan), ["maps", "storage_factor", "texels", "theta_deg"]);
+    let map = &plan["maps"][0];
+    assert_eq!(keys(map), ["error", "face", "lambda", "resolution", "split", "world_to_shadow"]);
+    assert_eq!(keys(&map["error"]), ["max", "max_s", "max_t"]);
+    assert_eq!(map["face"], Value::Null);
+    assert_eq!(map["split"], serde_json::json!([0.1, 500.0]));
+    let [w, h]: [u64; 2] = serde_json::from_value(map["resolution"].clone()).unwrap();
+    assert_eq!(plan["texels"], w * h);
+    assert!((1024 * 1000..=1024 * 1024).contains(&(w * h)), "{w}x{h}");
+    assert!(map["lambda"].as_f64().unwrap() > 0.0);
+    // View along −z, light (0.3, −1, 0.2): the angle between them.
+    let expected = (-0.2 / DVec3::new(0.3, -1.0, 0.2).length()).acos().to_degrees();
+    assert!((plan["theta_deg"].as_f64().unwrap() - expected).abs() < 1e-9);
+}
+
+#[test]
+fn matrices_take_columns_and_beams_to_points() {
+    let toward_light = -DVec3::new(0.3, -1.0, 0.2).normalize();
+    for shadows in
+        ["unfocused", "uniform", "psm", "lispsm", "tsm", "adaptive", "adaptive(area)", "lambda=20"]
+    {
+        let plan = plan(shadows);
+        let matrix = matrix(&plan["maps"][0]);
+        let project = |p: DVec3| -> DVec3 {
+            let h: DVec4 = matrix * p.extend(1.0);
+            h.xyz() / h.w
+        };
+        for seen in [
+            DVec3::new(0.0, 2.0, -0.2),
+            DVec3::new(3.0, 1.0, -20.0),
+            DVec3::new(-90.0, 60.0, -450.0),
+        ] {
+            let p = project(seen);
+            let inside =
+                p.cmpge(DVec3::splat(-1e-6)).all() && p.cmple(DVec3::splat(1.0 + 1e-6)).all();
+            assert!(inside, "{shadows}: {seen} lands at {p}");
+            let caster = project(seen + toward_light * 0.05);
+            assert!((caster - p).truncate().length() < 1e-6, "{shadows}: {p} {caster}");
+            assert!(caster.z < p.z, "{shadows}: {p} {caster}");
+        }
+    }
+}
+
+#[test]
+fn lambda_is_null_without_a_warp_and_kept_as_told() {
+    assert_eq!(plan("uniform")["maps"][0]["lambda"], Value::Null);
+    let told = plan("lambda=20")["maps"][0]["lambda"].as_f64().unwrap();
+    assert!((told - 20.0).abs() < 1e-9, "{told}");
+}
+
+#[test]
+fn exact_sizes_are_kept() {
+    let plan = plan("tsm@640x480");
+    assert_eq!(plan["maps"][0]["resolution"], serde_json::json!([640, 480]));
+    assert_eq!(plan["texels"], 640 * 480);
+}
+
+#[test]
+fn the_table_tells_the_same() {
+    let text = Desk::new().succeed(&[&VIEW[..], &["--shadows", "lispsm@640x480"]].concat());
+    for part in
+        ["lispsm@640x480", "307200", "640x480 texels", "0.1 to 500 metres", "λ =", "100.84°"]
+    {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn a_scene_tightens_the_plan() {
+    let desk = Desk::new();
+    desk.write("stage.gltf", STAGE_GLTF);
+    let camera = ["--size", "320x180", "--json", "--shadows", "uniform"];
+    let front = desk.json(&[&["plan", "stage.gltf"], &camera[..]].concat());
+    let named = desk.json(
+        &[&["plan", "stage.gltf", "--camera", "front", "--light", "noon"], &camera[..]].concat(),
+    );
+    assert_eq!(front, named, "the first camera and the first light are the defaults");
+    let above = desk.json(&[&["plan", "stage.gltf", "--camera", "above"], &camera[..]].concat());
+    assert_ne!(front["theta_deg"], above["theta_deg"]);
+    assert!(above["theta_deg"].as_f64().unwrap() < 1e-3, "camera and light both look down");
+    let narrow = desk
+        .json(&[&["plan", "stage.gltf", "--camera", "front", "--fov", "20"], &camera[..]].concat());
+    assert!(
+        narrow["maps"][0]["error"]["max"].as_f64() != front["maps"][0]["error"]["max"].as_f64()
+    );
+    let spot = desk.json(&[&["plan", "stage.gltf", "--light", "torch"], &camera[..]].concat());
+    assert!(spot["texels"].as_u64().unwrap() > 0);
+}
+
+#[test]
+fn looking_away_from_everything_gives_an_empty_map() {
+    let desk = Desk::new();
+    desk.write("stage.gltf", STAGE_GLTF);
+    let away = [
+        "plan",
+        "stage.gltf",
+        "--eye",
+        "0,50,0",
+        "--target",
+        "0,90,0.1",
+        "--near",
+        "1",
+        "--far",
+        "100",
+    ];
+    let plan = desk.json(&[&away[..], &["--json"]].concat());
+    assert_eq!(plan["texels"], 0);
+    assert_eq!(plan["maps"][0]["resolution"], serde_json::json!([0, 0]));
+    assert!(desk.succeed(&away).contains("empty"));
+}
+
+#[test]
+fn a_reader_that_leaves_early_is_no_error() {
+    use std::process::Stdio;
+    let desk = Desk::new();
+    for args in [&[&VIEW[..], &["--json"]].concat()[..], &["scenes"], &["--help"]] {
+        let mut command = desk.command(args);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{args:?}");
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{args:?}");
+    }
+}

@@ -1,0 +1,123 @@
+use crate::desk::{Desk, STAGE_GLTF};
+use image::{ColorType, GenericImageView};
+
+const AOVS: [&str; 9] = [
+    "color",
+    "visibility",
+    "truth",
+    "difference",
+    "error",
+    "depth",
+    "normal",
+    "texels",
+    "partition",
+];
+
+#[test]
+fn every_aov_is_written_as_png_and_exr() {
+    let desk = Desk::new();
+    let common = ["--size", "48x27", "--samples", "2", "--shadows", "lispsm:pcf3@128"];
+    for aov in AOVS {
+        let [png, exr] = [format!("{aov}.png"), format!("{aov}.exr")];
+        desk.succeed(&[&["render", "pole", "-o", &png, "--aov", aov], &common[..]].concat());
+        desk.succeed(&[&["render", "pole", "-o", &exr, "--aov", aov], &common[..]].concat());
+        let picture = image::open(desk.path(&png)).unwrap();
+        assert_eq!(picture.dimensions(), (48, 27), "{aov}");
+        let is_gray = ["visibility", "truth"].contains(&aov);
+        assert_eq!(picture.color(), if is_gray { ColorType::L8 } else { ColorType::Rgb8 }, "{aov}");
+        assert!(
+            std::fs::read(desk.path(&exr)).unwrap().starts_with(&[0x76, 0x2f, 0x31, 0x01]),
+            "{aov}"
+        );
+        let first = picture.pixels().next().unwrap().2;
+        let is_flat = picture.pixels().all(|(_, _, p)| p == first);
+        assert!(!is_flat, "{aov} shows nothing");
+    }
+    assert_eq!(desk.listing().len(), 2 * AOVS.len());
+}
+
+#[test]
+fn visibility_is_white_in_light_and_black_in_shadow() {
+    // Straight from above onto a triangle in the sun: all of it is lit. With the light from below all
+    // of it faces away.
+    let desk = Desk::new();
+    desk.write("stage.gltf", STAGE_GLTF);
+    let common = [
+        "render",
+        "stage.gltf",
+        "--eye",
+        "0,6,1",
+        "--target",
+        "0,0,1",
+        "--up",
+        "0,0,-1",
+        "--fov",
+        "30",
+        "--size",
+        "16x16",
+    ];
+    for (sun, expected) in [("0.1,-1,0", 255), ("0.1,1,0", 0)] {
+        for aov in ["visibility", "truth"] {
+            desk.succeed(&[&common[..], &["--sun", sun, "--aov", aov, "-o", "v.png"]].concat());
+            let picture = image::open(desk.path("v.png")).unwrap().to_luma8();
+            assert!(picture.pixels().all(|p| p.0 == [expected]), "{aov}, sun {sun}");
+        }
+    }
+}
+
+#[test]
+fn masks_are_ignored_only_if_told() {
+    let desk = Desk::new();
+    let house = crate::desk::shared_scene("house/house.glb");
+    let common = ["render", &house, "--aov", "truth", "--size", "64x36", "--samples", "1"];
+    desk.succeed(&[&common[..], &["-o", "masked.png"]].concat());
+    desk.succeed(&[&common[..], &["-o", "solid.png", "--opaque"]].concat());
+    let [masked, solid] =
+        ["masked.png", "solid.png"].map(|n| image::open(desk.path(n)).unwrap().to_luma8());
+    assert_ne!(masked, solid);
+}
+
+#[test]
+fn more_samples_smooth_edges() {
+    let desk = Desk::new();
+    for samples in ["1", "4"] {
+        let file = format!("{samples}.png");
+        desk.succeed(&[
+            "render",
+            "pole",
+            "--aov",
+            "truth",
+            "--size",
+            "64x36",
+            "--samples",
+            samples,
+            "-o",
+            &file,
+        ]);
+    }
+    let grays = |file: &str| {
+        let picture = image::open(desk.path(file)).unwrap().to_luma8();
+        picture.pixels().filter(|p| !matches!(p.0[0], 0 | 255)).count()
+    };
+    assert_eq!(grays("1.png"), 0);
+    assert!(grays("4.png") > 5);
+}
+
+#[test]
+fn an_existing_picture_is_replaced_and_nothing_is_left_beside_it() {
+    let desk = Desk::new();
+    desk.write("p.png", "old");
+    desk.succeed(&["render", "pole", "--size", "8x8", "-o", "p.png"]);
+    assert_eq!(image::open(desk.path("p.png")).unwrap().dimensions(), (8, 8));
+    assert_eq!(desk.listing(), ["p.png"]);
+}
+
+#[test]
+fn auto_says_what_it_takes_and_reference_does_not() {
+    let desk = Desk::new();
+    let run = |backend| {
+        desk.run(&["render", "pole", "--size", "8x8", "-o", "p.png", "--backend", backend])
+    };
+    assert!(run("auto").stderr.contains("reference"));
+    assert_eq!(run("reference").stderr, "");
+}
