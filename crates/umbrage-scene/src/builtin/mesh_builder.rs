@@ -137,6 +137,27 @@ impl MeshBuilder {
         self
     }
 
+    /// A ring around `center` in the plane across `normal`; `cells` along and around the tube.
+    pub(super) fn torus(
+        &mut self,
+        center: Vec3,
+        normal: Vec3,
+        radius: f32,
+        tube: f32,
+        cells: [u32; 2],
+    ) -> &mut Self {
+        let n = normal.normalize();
+        let across = n.any_orthonormal_vector();
+        let other = n.cross(across);
+        self.grid(cells, |u, v| {
+            let ((sin_u, cos_u), (sin_v, cos_v)) = (turn(u), turn(v));
+            let out = across * cos_u + other * sin_u;
+            let normal = out * cos_v + n * sin_v;
+            (center + out * radius + normal * tube, normal)
+        });
+        self
+    }
+
     /// A round bar between two points.
     pub(super) fn bar(&mut self, from: Vec3, to: Vec3, radius: f32, sides: u32) -> &mut Self {
         self.tube(&[from, to], &[radius; 2], sides)

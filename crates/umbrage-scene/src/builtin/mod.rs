@@ -1,8 +1,12 @@
 //! Scenes made by rule.
 
 pub mod closed_form;
+mod fence;
+mod grove;
 mod mesh_builder;
+mod plants;
 mod stage;
+mod statues;
 
 use crate::error::SceneError;
 use crate::types::Scene;
@@ -25,6 +29,30 @@ pub struct BuiltinInfo {
 }
 
 const BUILTINS: &[BuiltinInfo] = &[
+    BuiltinInfo {
+        name: "statues",
+        about: "Ornate statues, evenly spaced on a plane",
+        size_means: "statues along each side of their square",
+        default_size: 5,
+        max_size: 40,
+        build: statues::statues,
+    },
+    BuiltinInfo {
+        name: "grove",
+        about: "Trees with thin branches and cut-out leaves along a path",
+        size_means: "trees",
+        default_size: 40,
+        max_size: 4000,
+        build: grove::grove,
+    },
+    BuiltinInfo {
+        name: "fence",
+        about: "An iron fence before frames, ladders and globes of great depth complexity",
+        size_means: "rows behind the fence",
+        default_size: 6,
+        max_size: 100,
+        build: fence::fence,
+    },
     BuiltinInfo {
         name: "pole",
         about: "A square pole on a plane; its shadow has a closed form",

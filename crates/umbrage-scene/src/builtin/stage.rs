@@ -1,7 +1,5 @@
 use super::mesh_builder::MeshBuilder;
-use crate::types::{
-    Alpha, Instance, Material, Mesh, Scene, SceneCamera, SceneLight, Texture, TextureId,
-};
+use crate::types::{Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId};
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 use umbrage::Light;
 
@@ -99,14 +97,10 @@ impl Stage {
             intensity: 100_000.0,
         });
     }
-
-    /// The meshes added so far.
-    pub(super) fn meshes(&self) -> &[Mesh] {
-        &self.scene.meshes
-    }
 }
 
 /// How a camera of a [`Stage`] sees. Depths in metres.
+#[derive(Clone, Copy)]
 pub(super) struct Lens {
     pub(super) fov_y_deg: f64,
     pub(super) near: f64,
