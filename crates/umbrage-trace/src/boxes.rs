@@ -25,15 +25,9 @@ impl Boxes {
     /// The tree for primitives with these indices and boxes, none empty. `slack` widens all boxes,
     /// for errors that the caller makes.
     pub(crate) fn build(primitives: &[(u32, Aabb)], slack: f64) -> Self {
-        let all = primitives
-            .iter()
-            .fold(Aabb::EMPTY, |all, (_, b)| all.union(*b));
+        let all = primitives.iter().fold(Aabb::EMPTY, |all, (_, b)| all.union(*b));
         if all.is_empty() {
-            return Self {
-                center: DVec3::ZERO,
-                outermost: all,
-                tree: Bvh2::default(),
-            };
+            return Self { center: DVec3::ZERO, outermost: all, tree: Bvh2::default() };
         }
         let center = all.center();
         let pad = all.size().length() * 2f64.powi(-21) + slack;
@@ -44,31 +38,18 @@ impl Boxes {
                 let max = (b.max - center + pad).as_vec3();
                 let down = min.to_array().map(f32::next_down);
                 let up = max.to_array().map(f32::next_up);
-                obvhs::aabb::Aabb {
-                    min: Vec3A::from(down),
-                    max: Vec3A::from(up),
-                }
+                obvhs::aabb::Aabb { min: Vec3A::from(down), max: Vec3A::from(up) }
             })
             .collect();
         // The triangle test in double precision costs more than a box: small leaves.
-        let parameters = BvhBuildParams {
-            max_prims_per_leaf: 4,
-            ..BvhBuildParams::medium_build()
-        };
+        let parameters = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
         let mut tree = build_bvh2(&padded, parameters, &mut Duration::default());
         tree.max_depth = depth(&tree);
         for slot in &mut tree.primitive_indices {
             *slot = primitives[*slot as usize].0;
         }
-        let outermost = Aabb {
-            min: all.min - 2.0 * pad,
-            max: all.max + 2.0 * pad,
-        };
-        Self {
-            center,
-            outermost,
-            tree,
-        }
+        let outermost = Aabb { min: all.min - 2.0 * pad, max: all.max + 2.0 * pad };
+        Self { center, outermost, tree }
     }
 
     /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`, roughly
@@ -103,8 +84,7 @@ impl Boxes {
             true
         };
         fast_stack!(u32, (48, 192), self.tree.max_depth, stack, {
-            self.tree
-                .ray_traverse_dynamic(&mut stack, single, &mut RayHit::none(), leaf);
+            self.tree.ray_traverse_dynamic(&mut stack, single, &mut RayHit::none(), leaf);
         });
     }
 }

@@ -28,9 +28,6 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn scene(place: String, problem: impl Into<String>) -> Self {
-        Self::Scene {
-            place,
-            problem: problem.into(),
-        }
+        Self::Scene { place, problem: problem.into() }
     }
 }

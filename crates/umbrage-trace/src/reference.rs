@@ -30,45 +30,26 @@ impl DepthMap {
     ) -> Result<Self, Error> {
         let resolution = map.resolution;
         if map.is_empty() {
-            return Ok(Self {
-                resolution: [0, 0],
-                gutter: 0,
-                texels: Vec::new(),
-            });
+            return Ok(Self { resolution: [0, 0], gutter: 0, texels: Vec::new() });
         }
         let [width, height] = resolution.map(|n| n as usize + 2 * gutter as usize);
         let mut texels = Vec::new();
-        let count = width
-            .checked_mul(height)
-            .ok_or(Error::Memory { resolution })?;
-        texels
-            .try_reserve_exact(count)
-            .map_err(|_| Error::Memory { resolution })?;
+        let count = width.checked_mul(height).ok_or(Error::Memory { resolution })?;
+        texels.try_reserve_exact(count).map_err(|_| Error::Memory { resolution })?;
         texels.resize(count, 1.0);
-        texels
-            .par_chunks_mut(width)
-            .enumerate()
-            .for_each(|(row, texels)| {
-                for (column, texel) in texels.iter_mut().enumerate() {
-                    let center = DVec2::new(column as f64, row as f64) + 0.5 - f64::from(gutter);
-                    *texel = depth_at(tracer, map, center).unwrap_or(1.0);
-                }
-                progress(1);
-            });
-        Ok(Self {
-            resolution,
-            gutter,
-            texels,
-        })
+        texels.par_chunks_mut(width).enumerate().for_each(|(row, texels)| {
+            for (column, texel) in texels.iter_mut().enumerate() {
+                let center = DVec2::new(column as f64, row as f64) + 0.5 - f64::from(gutter);
+                *texel = depth_at(tracer, map, center).unwrap_or(1.0);
+            }
+            progress(1);
+        });
+        Ok(Self { resolution, gutter, texels })
     }
 
     /// Rows that [`render`](Self::render) will report.
     pub fn rows(map: &ShadowMap, gutter: u32) -> u64 {
-        if map.is_empty() {
-            0
-        } else {
-            u64::from(map.resolution[1]) + 2 * u64::from(gutter)
-        }
+        if map.is_empty() { 0 } else { u64::from(map.resolution[1]) + 2 * u64::from(gutter) }
     }
 
     /// Texels in s and t, without the gutter.
@@ -96,10 +77,7 @@ fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     let [width, height] = map.resolution.map(f64::from);
     let st = DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height));
     let beam = map.beam(st)?;
-    let ray = Ray {
-        origin: beam.origin,
-        direction: beam.direction,
-    };
+    let ray = Ray { origin: beam.origin, direction: beam.direction };
     let hit = tracer.closest(ray, [-beam.reach_back, f64::INFINITY])?;
     let depth = map.project(tracer.position(&hit)).map_or(1.0, |p| p.z);
     Some(depth.clamp(0.0, 1.0) as f32)
@@ -141,10 +119,7 @@ impl<'a> Reference<'a> {
 
     /// Rows of texels that [`render`](Self::render) will report.
     pub fn rows(plan: &Plan, filter: Filter) -> u64 {
-        plan.maps
-            .iter()
-            .map(|m| DepthMap::rows(m, filter.reach_texels()))
-            .sum()
+        plan.maps.iter().map(|m| DepthMap::rows(m, filter.reach_texels())).sum()
     }
 
     /// The maps' depths, in the plan's order.
@@ -163,12 +138,9 @@ impl<'a> Reference<'a> {
             return 1.0;
         };
         let map = &self.plan.maps[index];
-        map.receiver(surface.position, surface.geometric_normal)
-            .map_or(1.0, |receiver| {
-                visibility(map, self.filter, &receiver, |i, j| {
-                    self.maps[index].texel(i, j)
-                })
-            })
+        map.receiver(surface.position, surface.geometric_normal).map_or(1.0, |receiver| {
+            visibility(map, self.filter, &receiver, |i, j| self.maps[index].texel(i, j))
+        })
     }
 
     /// The map that serves a point, and where in it the point lies; `None` if no map does.
@@ -183,16 +155,11 @@ impl<'a> Reference<'a> {
 
 /// The first of the plan's maps that serves a point's depth and holds it.
 fn map_texel(plan: &Plan, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
-    plan.maps
-        .iter()
-        .enumerate()
-        .filter(|(_, m)| m.serves(camera, world_position))
-        .find_map(|(index, map)| {
+    plan.maps.iter().enumerate().filter(|(_, m)| m.serves(camera, world_position)).find_map(
+        |(index, map)| {
             let st = map.project(world_position)?.truncate();
             let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
-            is_inside.then(|| MapTexel {
-                map: index,
-                texel: texel_coordinates(map, st),
-            })
-        })
+            is_inside.then(|| MapTexel { map: index, texel: texel_coordinates(map, st) })
+        },
+    )
 }

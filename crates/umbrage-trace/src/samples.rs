@@ -50,17 +50,9 @@ impl<'a> View<'a> {
         grid: u32,
     ) -> Result<Self, Error> {
         if !(1..=64).contains(&grid) {
-            return Err(Error::Samples {
-                given: grid,
-                max: 64,
-            });
+            return Err(Error::Samples { given: grid, max: 64 });
         }
-        Ok(Self {
-            tracer,
-            camera,
-            light,
-            grid,
-        })
+        Ok(Self { tracer, camera, light, grid })
     }
 
     /// Who looks.
@@ -84,9 +76,7 @@ impl<'a> View<'a> {
         let [width, height] = self.camera.image();
         let samples_per_row = u64::from(width) * u64::from(self.grid).pow(2);
         let rows = (BAND_SAMPLES / samples_per_row).clamp(1, u64::from(height)) as u32;
-        (0..height)
-            .step_by(rows as usize)
-            .map(move |first| first..height.min(first + rows))
+        (0..height).step_by(rows as usize).map(move |first| first..height.min(first + rows))
     }
 
     /// What is seen in these rows, clipped to the picture.
@@ -102,12 +92,7 @@ impl<'a> View<'a> {
                 row
             })
             .collect();
-        Band {
-            rows,
-            width,
-            grid: self.grid,
-            samples,
-        }
+        Band { rows, width, grid: self.grid, samples }
     }
 
     fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Option<Sample>> {
@@ -122,21 +107,12 @@ impl<'a> View<'a> {
     /// camera's near distance nothing is; beyond its far distance surfaces are seen, but no shadow
     /// map serves them.
     pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
-        let ray = Ray {
-            origin: self.camera.eye(),
-            direction: self.camera.ray(pixel),
-        };
-        let hit = self
-            .tracer
-            .closest(ray, [self.camera.near(), f64::INFINITY])?;
+        let ray = Ray { origin: self.camera.eye(), direction: self.camera.ray(pixel) };
+        let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
         let surface = self.tracer.surface(&hit, ray.direction);
         let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
         // The ray has unit depth, so its parameter is the depth.
-        Some(Sample {
-            surface,
-            depth: hit.t,
-            is_facing,
-        })
+        Some(Sample { surface, depth: hit.t, is_facing })
     }
 
     /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
@@ -188,10 +164,8 @@ impl Band {
         self.samples
             .par_chunks(row)
             .flat_map_iter(|samples| {
-                let row: Vec<T> = samples
-                    .iter()
-                    .map(|s| s.as_ref().map_or_else(T::default, &value))
-                    .collect();
+                let row: Vec<T> =
+                    samples.iter().map(|s| s.as_ref().map_or_else(T::default, &value)).collect();
                 progress(1);
                 row
             })

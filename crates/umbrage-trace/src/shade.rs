@@ -27,10 +27,7 @@ pub fn picture(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<[u8; 3]>
     let per_pixel = band.samples_per_pixel();
     let width = view.camera().image()[0] as usize;
     let first_row = f64::from(band.rows().start);
-    let pixels = band
-        .samples()
-        .chunks(per_pixel)
-        .zip(visibility.chunks(per_pixel));
+    let pixels = band.samples().chunks(per_pixel).zip(visibility.chunks(per_pixel));
     pixels
         .enumerate()
         .map(|(i, (samples, visibility))| {
@@ -103,11 +100,7 @@ fn compress(color: Vec3) -> Vec3 {
     const DESATURATION: f32 = 0.15;
     let color = color.max(Vec3::ZERO);
     let low = color.min_element();
-    let offset = if low < 0.08 {
-        low - 6.25 * low * low
-    } else {
-        0.04
-    };
+    let offset = if low < 0.08 { low - 6.25 * low * low } else { 0.04 };
     let color = color - offset;
     let peak = color.max_element();
     if peak < START {
@@ -123,20 +116,14 @@ fn compress(color: Vec3) -> Vec3 {
 fn encode(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|c| {
         let c = c.clamp(0.0, 1.0);
-        let srgb = if c <= 0.003_130_8 {
-            12.92 * c
-        } else {
-            1.055 * c.powf(1.0 / 2.4) - 0.055
-        };
+        let srgb = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
         (srgb * 255.0).round() as u8
     })
 }
 
 /// A direction as a colour: each coordinate from −1 to 1 as 0 to 255.
 pub fn normal_color(normal: DVec3) -> [u8; 3] {
-    (normal * 0.5 + 0.5)
-        .to_array()
-        .map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+    (normal * 0.5 + 0.5).to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
 /// Depth (metres) as grey, from white at the camera's near distance to black at its far one, by the

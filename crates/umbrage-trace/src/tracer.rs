@@ -127,35 +127,19 @@ impl<'a> Tracer<'a> {
 
         // Rays are taken to mesh space with an error of a few roundings of the distance they come
         // from; bound it by 32 roundings of the scene's size.
-        let size = if bounds.is_empty() {
-            0.0
-        } else {
-            bounds.size().length()
-        };
+        let size = if bounds.is_empty() { 0.0 } else { bounds.size().length() };
         let mut slack = vec![0.0f64; scene.meshes.len()];
         for p in &placements {
-            let shrink = frobenius_norm(p.mesh_from_world);
+            let shrink = stretch(p.mesh_from_world);
             slack[p.mesh] = slack[p.mesh].max(shrink * size * 2f64.powi(-48));
         }
         let meshes = scene.meshes.par_iter().zip(slack);
-        let meshes = meshes
-            .map(|(mesh, slack)| MeshBoxes::build(mesh, slack, scene))
-            .collect();
-        let farthest = if bounds.is_empty() {
-            DVec3::ZERO
-        } else {
-            bounds.min.abs().max(bounds.max.abs())
-        };
+        let meshes = meshes.map(|(mesh, slack)| MeshBoxes::build(mesh, slack, scene)).collect();
+        let farthest =
+            if bounds.is_empty() { DVec3::ZERO } else { bounds.min.abs().max(bounds.max.abs()) };
         let boxes: Vec<(u32, Aabb)> = (0..).zip(placed).filter(|(_, b)| !b.is_empty()).collect();
         let instances = Boxes::build(&boxes, farthest.length() * 2f64.powi(-48));
-        Ok(Self {
-            scene,
-            meshes,
-            placements,
-            instances,
-            bounds,
-            opaque: false,
-        })
+        Ok(Self { scene, meshes, placements, instances, bounds, opaque: false })
     }
 
     /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
@@ -181,11 +165,7 @@ impl<'a> Tracer<'a> {
         self.visit(ray, range, |primitive, hit| {
             let nearer = best.is_none_or(|b| (hit.t, primitive) < (b.t, b.primitive));
             if nearer && hit.t >= range[0] && hit.t < range[1] && self.is_there(primitive, hit) {
-                best = Some(Hit {
-                    t: hit.t,
-                    primitive,
-                    barycentrics: hit.weights,
-                });
+                best = Some(Hit { t: hit.t, primitive, barycentrics: hit.weights });
             }
             Some(best.map_or(range[1], |b| b.t))
         });
@@ -207,36 +187,21 @@ impl<'a> Tracer<'a> {
     /// storing corners in single precision moves a surface, 2⁻²³ of its mesh's coordinates, plus some
     /// 2⁻⁵⁰ of its world position.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
-        let departure = Departure {
-            from: surface.primitive,
-            position_error: surface.position_error,
-        };
-        self.any(
-            Ray {
-                origin: surface.position,
-                direction,
-            },
-            [0.0, end],
-            Some(departure),
-        )
+        let departure =
+            Departure { from: surface.primitive, position_error: surface.position_error };
+        self.any(Ray { origin: surface.position, direction }, [0.0, end], Some(departure))
     }
 
     /// World position of a hit, metres: the triangle's own point, not one along the ray.
     pub fn position(&self, hit: &Hit) -> DVec3 {
         let placement = &self.placements[hit.primitive.instance as usize];
         let corners = self.corners(hit.primitive);
-        placement
-            .world_from_mesh
-            .transform_point3(weigh(corners, hit.barycentrics))
+        placement.world_from_mesh.transform_point3(weigh(corners, hit.barycentrics))
     }
 
     /// All about the surface at a hit, as seen from a ray travelling in `view_direction`.
     pub fn surface(&self, hit: &Hit, view_direction: DVec3) -> Surface {
-        let Hit {
-            primitive,
-            barycentrics,
-            ..
-        } = *hit;
+        let Hit { primitive, barycentrics, .. } = *hit;
         let placement = &self.placements[primitive.instance as usize];
         let mesh = &self.scene.meshes[placement.mesh];
         let corners = self.corners(primitive);
@@ -245,18 +210,14 @@ impl<'a> Tracer<'a> {
             (placement.mesh_from_world.transpose() * mesh_normal).try_normalize()
         };
         let plane = normal_of(corners);
-        let geometric_normal =
-            world_normal(plane / plane.abs().max_element()).map_or(-view_direction, |n| {
-                if n.dot(view_direction) > 0.0 { -n } else { n }
-            });
+        let geometric_normal = world_normal(plane / plane.abs().max_element())
+            .map_or(-view_direction, |n| if n.dot(view_direction) > 0.0 { -n } else { n });
         let indices = mesh.triangles[primitive.triangle as usize].map(|i| i as usize);
         let shading_normal = (!mesh.normals.is_empty())
             .then(|| weigh(indices.map(|i| mesh.normals[i].as_dvec3()), barycentrics))
             .and_then(world_normal)
             .filter(|n| n.is_finite())
-            .map_or(geometric_normal, |n| {
-                if n.dot(geometric_normal) < 0.0 { -n } else { n }
-            });
+            .map_or(geometric_normal, |n| if n.dot(geometric_normal) < 0.0 { -n } else { n });
         let uv = texture_coordinates(mesh, primitive, barycentrics);
         let material = &self.scene.materials[mesh.material];
         let texture = self.texture(material, mesh);
@@ -343,17 +304,15 @@ impl<'a> Tracer<'a> {
             };
             let sheared = ShearedRay::new(local);
             let mut stopped = false;
-            self.meshes[placement.mesh]
-                .boxes
-                .visit(local, [range[0], end], |triangle| {
-                    if let Some(hit) = sheared.intersect(corners(mesh, triangle)) {
-                        match visit(PrimitiveRef { instance, triangle }, &hit) {
-                            Some(nearer) => end = nearer,
-                            None => stopped = true,
-                        }
+            self.meshes[placement.mesh].boxes.visit(local, [range[0], end], |triangle| {
+                if let Some(hit) = sheared.intersect(corners(mesh, triangle)) {
+                    match visit(PrimitiveRef { instance, triangle }, &hit) {
+                        Some(nearer) => end = nearer,
+                        None => stopped = true,
                     }
-                    (!stopped).then_some(end)
-                });
+                }
+                (!stopped).then_some(end)
+            });
             (!stopped).then_some(end)
         });
     }
@@ -375,10 +334,7 @@ impl<'a> MeshBoxes<'a> {
                 texture: texture_of(scene, material, mesh),
             }),
         };
-        Self {
-            boxes: Boxes::build(&boxes, slack),
-            mask,
-        }
+        Self { boxes: Boxes::build(&boxes, slack), mask }
     }
 }
 
@@ -396,24 +352,15 @@ impl Placement {
         if !world_from_mesh.is_finite() || !mesh_from_world.is_finite() {
             return wrong("world_from_mesh", "must be finite and invertible");
         }
-        let stretch = frobenius_norm(world_from_mesh.matrix3);
-        Ok(Self {
-            mesh: instance.mesh,
-            world_from_mesh,
-            mesh_from_world,
-            stretch,
-        })
+        let stretch = stretch(world_from_mesh.matrix3);
+        Ok(Self { mesh: instance.mesh, world_from_mesh, mesh_from_world, stretch })
     }
 
     fn bounds(&self, mesh_bounds: Aabb) -> Aabb {
         if mesh_bounds.is_empty() {
             return Aabb::EMPTY;
         }
-        Aabb::around(
-            mesh_bounds
-                .corners()
-                .map(|c| self.world_from_mesh.transform_point3(c)),
-        )
+        Aabb::around(mesh_bounds.corners().map(|c| self.world_from_mesh.transform_point3(c)))
     }
 
     /// How far from `position` its triangle may have been meant to be, metres.
@@ -424,10 +371,7 @@ impl Placement {
     /// mesh's and the world's coordinates; the former vanish beside 2⁻²⁴, the latter do not far from
     /// the origin.
     fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
-        let largest = corners
-            .iter()
-            .fold(DVec3::ZERO, |m, c| m.max(c.abs()))
-            .max_element();
+        let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
         let world =
             position.abs().max_element() + self.world_from_mesh.translation.abs().max_element();
         largest * self.stretch * 2f64.powi(-23) + world * 2f64.powi(-49)
@@ -458,14 +402,16 @@ fn texture_coordinates(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) 
 
 /// The texture of a material on a mesh that has coordinates for it.
 fn texture_of<'a>(scene: &'a Scene, material: &Material, mesh: &Mesh) -> Option<&'a Texture> {
-    let id = material
-        .base_color_texture
-        .filter(|_| !mesh.uvs.is_empty())?;
+    let id = material.base_color_texture.filter(|_| !mesh.uvs.is_empty())?;
     Some(&scene.textures[id.0])
 }
 
-fn frobenius_norm(m: DMat3) -> f64 {
-    m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
+/// How much a transform stretches any vector, at most; exact without shear. The square of the largest
+/// singular value is the largest eigenvalue of MᵀM, which no row sum's maximum is below.
+fn stretch(m: DMat3) -> f64 {
+    let square = m.transpose() * m;
+    let row_sums = square.x_axis.abs() + square.y_axis.abs() + square.z_axis.abs();
+    row_sums.max_element().sqrt()
 }
 
 fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
@@ -473,15 +419,10 @@ fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
         Err(Error::scene(format!("meshes[{index}].{field}"), problem))
     };
     let count = mesh.positions.len();
-    if let Some(i) = mesh
-        .positions
-        .iter()
-        .position(|p| !p.is_finite() || p.abs().max_element() > 1e12)
+    if let Some(i) =
+        mesh.positions.iter().position(|p| !p.is_finite() || p.abs().max_element() > 1e12)
     {
-        return wrong(
-            format!("positions[{i}]"),
-            "must be finite and at most 1e12".into(),
-        );
+        return wrong(format!("positions[{i}]"), "must be finite and at most 1e12".into());
     }
     for (field, length) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
         if length != 0 && length != count {
@@ -494,21 +435,12 @@ fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
     }
     let out_of_range = |t: &[u32; 3]| t.iter().any(|&i| i as usize >= count);
     if let Some(i) = mesh.triangles.iter().position(out_of_range) {
-        return wrong(
-            format!("triangles[{i}]"),
-            format!("must index {count} positions"),
-        );
+        return wrong(format!("triangles[{i}]"), format!("must index {count} positions"));
     }
     let Some(material) = scene.materials.get(mesh.material) else {
-        return wrong(
-            "material".into(),
-            "names a material that does not exist".into(),
-        );
+        return wrong("material".into(), "names a material that does not exist".into());
     };
-    if material
-        .base_color_texture
-        .is_some_and(|t| t.0 >= scene.textures.len())
-    {
+    if material.base_color_texture.is_some_and(|t| t.0 >= scene.textures.len()) {
         let place = format!("materials[{}].base_color_texture", mesh.material);
         return Err(Error::scene(place, "names a texture that does not exist"));
     }

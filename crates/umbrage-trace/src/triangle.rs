@@ -35,16 +35,8 @@ impl ShearedRay {
             [0, 1, 2]
         };
         let along = ray.direction[axes[2]];
-        let shear = [
-            ray.direction[axes[0]] / along,
-            ray.direction[axes[1]] / along,
-            1.0 / along,
-        ];
-        Self {
-            origin: ray.origin,
-            axes,
-            shear,
-        }
+        let shear = [ray.direction[axes[0]] / along, ray.direction[axes[1]] / along, 1.0 / along];
+        Self { origin: ray.origin, axes, shear }
     }
 
     /// The hit, anywhere along the line and from either side.

@@ -34,16 +34,9 @@ fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)> {
             let area = e1.cross(e2).length();
             // Edge-on there is no saying.
             let is_clear = determinant.abs() > 1e-9 * area * ray.direction.length();
-            let margin = if is_clear {
-                u.min(v).min(1.0 - u - v)
-            } else {
-                0.0
-            };
+            let margin = if is_clear { u.min(v).min(1.0 - u - v) } else { 0.0 };
             if t.is_finite() && margin > -1e-6 && t > 0.0 {
-                let primitive = PrimitiveRef {
-                    instance: i as u32,
-                    triangle: j as u32,
-                };
+                let primitive = PrimitiveRef { instance: i as u32, triangle: j as u32 };
                 hits.push((t, primitive, margin));
             }
         }
@@ -169,9 +162,7 @@ proptest! {
 fn instances_equal_their_flattened_mesh() {
     // Powers of two, quarter turns and small integers: flattening rounds nothing.
     let mut mesh = sphere(Vec3::ZERO, 1.0, 12);
-    mesh.positions
-        .iter_mut()
-        .for_each(|p| *p = (*p * 65536.0).round() / 65536.0);
+    mesh.positions.iter_mut().for_each(|p| *p = (*p * 65536.0).round() / 65536.0);
     let turn = DMat3::from_cols(DVec3::Z, DVec3::Y, -DVec3::X);
     let place = |i: i32, j: i32| {
         let scale = DMat3::from_diagonal(DVec3::new(0.5, if i % 2 == 0 { 1.0 } else { -2.0 }, 0.5));
@@ -187,14 +178,11 @@ fn instances_equal_their_flattened_mesh() {
         let first = flat.positions.len() as u32;
         let moved = |p: &Vec3| world_from_mesh.transform_point3(p.as_dvec3()).as_vec3();
         flat.positions.extend(mesh.positions.iter().map(moved));
-        flat.triangles
-            .extend(mesh.triangles.iter().map(|t| t.map(|i| i + first)));
+        flat.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + first)));
     }
     let flattened = scene(vec![flat], &[(0, DAffine3::IDENTITY)]);
-    let (instanced, flattened) = (
-        Tracer::new(&instanced).unwrap(),
-        Tracer::new(&flattened).unwrap(),
-    );
+    let (instanced, flattened) =
+        (Tracer::new(&instanced).unwrap(), Tracer::new(&flattened).unwrap());
     let mut random = Random(7);
     let mut hits = 0;
     for _ in 0..20_000 {
@@ -207,10 +195,7 @@ fn instances_equal_their_flattened_mesh() {
         hits += 1;
         let (pa, pb) = (instanced.position(&a), flattened.position(&b));
         assert!(pa.distance(pb) < 1e-12, "{pa} {pb}");
-        let (na, nb) = (
-            instanced.surface(&a, direction),
-            flattened.surface(&b, direction),
-        );
+        let (na, nb) = (instanced.surface(&a, direction), flattened.surface(&b, direction));
         let tolerance = 1e-12;
         let same_triangle = a.primitive.instance * mesh.triangles.len() as u32
             + a.primitive.triangle
@@ -235,20 +220,13 @@ fn a_mesh_drawn_often_is_stored_once() {
 #[test]
 fn closed_meshes_are_watertight() {
     // Every ray from inside hits, also those aimed exactly at corners and along edges.
-    for (radius, center) in [
-        (1.0, Vec3::ZERO),
-        (3e4, Vec3::new(1e5, 0.0, 7.0)),
-        (1e-3, Vec3::X),
-    ] {
+    for (radius, center) in [(1.0, Vec3::ZERO), (3e4, Vec3::new(1e5, 0.0, 7.0)), (1e-3, Vec3::X)] {
         let mesh = sphere(center, radius, 40);
         let scene = scene(vec![mesh.clone()], &[(0, DAffine3::IDENTITY)]);
         let tracer = Tracer::new(&scene).unwrap();
         let mut random = Random(3);
         let escapes = |origin: DVec3, target: DVec3| {
-            let ray = Ray {
-                origin,
-                direction: target - origin,
-            };
+            let ray = Ray { origin, direction: target - origin };
             tracer.closest(ray, EVERYWHERE).is_none() || !tracer.occluded(ray, EVERYWHERE)
         };
         for triangle in &mesh.triangles {
@@ -257,10 +235,7 @@ fn closed_meshes_are_watertight() {
             for origin in [center.as_dvec3(), inside] {
                 let weight = random.unit();
                 for target in [a, b, c, a.midpoint(b), b.lerp(c, weight), (a + b + c) / 3.0] {
-                    assert!(
-                        !escapes(origin, target),
-                        "{origin} to {target}, radius {radius}"
-                    );
+                    assert!(!escapes(origin, target), "{origin} to {target}, radius {radius}");
                 }
             }
         }
@@ -278,19 +253,14 @@ fn grid_lines_are_watertight() {
     }
     for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
         let a = j * (n + 1) + i;
-        mesh.triangles
-            .extend([[a, a + n + 1, a + n + 2], [a, a + n + 2, a + 1]]);
+        mesh.triangles.extend([[a, a + n + 1, a + n + 2], [a, a + n + 2, a + 1]]);
     }
     let scene = scene(vec![mesh.clone()], &[(0, at(1e5, 0.0, -1e5))]);
     let tracer = Tracer::new(&scene).unwrap();
     for p in &mesh.positions {
         let inner = p.x > 0.0 && p.z > 0.0 && p.x < 3.2 && p.z < 3.2;
         let above = p.as_dvec3() + DVec3::new(1e5, 1.0, -1e5);
-        for direction in [
-            -DVec3::Y,
-            DVec3::new(0.0, -1.0, 0.2),
-            DVec3::new(0.1, -1.0, 0.1),
-        ] {
+        for direction in [-DVec3::Y, DVec3::new(0.0, -1.0, 0.2), DVec3::new(0.1, -1.0, 0.1)] {
             let origin = above - direction - DVec3::Y;
             let ray = Ray { origin, direction };
             assert!(!inner || tracer.occluded(ray, EVERYWHERE), "{origin}");
@@ -301,10 +271,7 @@ fn grid_lines_are_watertight() {
 #[test]
 fn masks_cut_holes() {
     // Opaque left half, transparent right half, seen through and casting so.
-    let mut scene = scene(
-        vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)],
-        &[(0, at(5.0, 1.0, 0.0))],
-    );
+    let mut scene = scene(vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)], &[(0, at(5.0, 1.0, 0.0))]);
     scene.textures.push(Texture {
         size: [2, 1],
         rgba: vec![[255, 0, 0, 255], [0, 255, 0, 0]],
@@ -312,15 +279,10 @@ fn masks_cut_holes() {
     });
     scene.materials[0].alpha = Alpha::Mask { cutoff: 0.5 };
     scene.materials[0].base_color_texture = Some(TextureId(0));
-    let ray = |x: f64| Ray {
-        origin: DVec3::new(x, 3.0, 0.4),
-        direction: -DVec3::Y,
-    };
+    let ray = |x: f64| Ray { origin: DVec3::new(x, 3.0, 0.4), direction: -DVec3::Y };
     let is_there = |tracer: &Tracer<'_>, x: f64| {
-        let [hit, occluded] = [
-            tracer.closest(ray(x), EVERYWHERE).is_some(),
-            tracer.occluded(ray(x), EVERYWHERE),
-        ];
+        let [hit, occluded] =
+            [tracer.closest(ray(x), EVERYWHERE).is_some(), tracer.occluded(ray(x), EVERYWHERE)];
         assert_eq!(hit, occluded);
         hit
     };
@@ -336,63 +298,30 @@ fn masks_cut_holes() {
     below.material = 1;
     scene.materials.push(common::plain());
     scene.meshes.push(below);
-    scene.instances.push(Instance {
-        mesh: 1,
-        world_from_mesh: DAffine3::IDENTITY,
-    });
+    scene.instances.push(Instance { mesh: 1, world_from_mesh: DAffine3::IDENTITY });
     let tracer = Tracer::new(&scene).unwrap();
-    assert_eq!(
-        common::below(&tracer, DVec3::new(5.7, 3.0, 0.4))
-            .primitive
-            .instance,
-        1
-    );
-    assert_eq!(
-        common::below(&tracer, DVec3::new(5.3, 3.0, 0.4))
-            .primitive
-            .instance,
-        0
-    );
+    assert_eq!(common::below(&tracer, DVec3::new(5.7, 3.0, 0.4)).primitive.instance, 1);
+    assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).primitive.instance, 0);
     // Without texture coordinates the factor alone decides.
     scene.meshes[0].uvs = Vec::new();
     scene.materials[0].base_color.w = 0.4;
     let tracer = Tracer::new(&scene).unwrap();
-    assert_eq!(
-        common::below(&tracer, DVec3::new(5.3, 3.0, 0.4))
-            .primitive
-            .instance,
-        1
-    );
-    assert_eq!(
-        common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).uv,
-        Vec2::new(0.52, 0.765)
-    );
+    assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).primitive.instance, 1);
+    assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).uv, Vec2::new(0.52, 0.765));
 }
 
 #[test]
 fn empty_and_degenerate_scenes_have_no_hits() {
-    let ray = Ray {
-        origin: DVec3::ZERO,
-        direction: DVec3::X,
-    };
-    let collinear = [
-        Vec3::new(1.0, -1.1, 0.3),
-        Vec3::new(1.0, 0.0, 0.3),
-        Vec3::new(1.0, 1.1, 0.3),
-    ];
+    let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X };
+    let collinear = [Vec3::new(1.0, -1.1, 0.3), Vec3::new(1.0, 0.0, 0.3), Vec3::new(1.0, 1.1, 0.3)];
     let point = [Vec3::X; 3];
-    for meshes in [
-        vec![],
-        vec![umbrage_scene::Mesh::default()],
-        vec![soup(&[collinear, point, point])],
-    ] {
+    for meshes in
+        [vec![], vec![umbrage_scene::Mesh::default()], vec![soup(&[collinear, point, point])]]
+    {
         let places: Vec<_> = (0..meshes.len()).map(|i| (i, DAffine3::IDENTITY)).collect();
         let scene = scene(meshes, &places);
         let tracer = Tracer::new(&scene).unwrap();
-        assert_eq!(
-            tracer.closest(ray, [f64::NEG_INFINITY, f64::INFINITY]),
-            None
-        );
+        assert_eq!(tracer.closest(ray, [f64::NEG_INFINITY, f64::INFINITY]), None);
         assert!(!tracer.occluded(ray, EVERYWHERE));
     }
 }
@@ -412,21 +341,12 @@ fn rays_that_are_none_hit_nothing() {
     ] {
         assert_eq!(tracer.closest(Ray { origin, direction }, range), None);
     }
-    let ray = Ray {
-        origin: up,
-        direction: -DVec3::Y,
-    };
+    let ray = Ray { origin: up, direction: -DVec3::Y };
     assert_eq!(tracer.closest(ray, [1.0, 1.5]).map(|h| h.t), Some(1.0));
     // From either side, and backwards along an unbounded line.
-    let from_below = Ray {
-        origin: -up,
-        direction: DVec3::Y,
-    };
+    let from_below = Ray { origin: -up, direction: DVec3::Y };
     assert!(tracer.occluded(from_below, EVERYWHERE));
-    let above = Ray {
-        origin: up,
-        direction: DVec3::Y,
-    };
+    let above = Ray { origin: up, direction: DVec3::Y };
     assert!(tracer.occluded(above, [f64::NEG_INFINITY, f64::INFINITY]));
 }
 
@@ -434,21 +354,13 @@ fn rays_that_are_none_hit_nothing() {
 fn broken_scenes_are_named() {
     let good = || scene(vec![ground(1.0)], &[(0, DAffine3::IDENTITY)]);
     let cases: [(&str, fn(&mut Scene)); 8] = [
-        ("meshes[0].positions[2]", |s| {
-            s.meshes[0].positions[2].y = f32::NAN
-        }),
-        ("meshes[0].triangles[1]", |s| {
-            s.meshes[0].triangles[1] = [0, 1, 4]
-        }),
+        ("meshes[0].positions[2]", |s| s.meshes[0].positions[2].y = f32::NAN),
+        ("meshes[0].triangles[1]", |s| s.meshes[0].triangles[1] = [0, 1, 4]),
         ("meshes[0].normals", |s| s.meshes[0].normals.truncate(2)),
         ("meshes[0].material", |s| s.meshes[0].material = 9),
         ("instances[0].mesh", |s| s.instances[0].mesh = 1),
-        ("instances[0].world_from_mesh", |s| {
-            s.instances[0].world_from_mesh = DAffine3::ZERO
-        }),
-        ("instances[0]", |s| {
-            s.instances[0].world_from_mesh.translation.x = 1e13
-        }),
+        ("instances[0].world_from_mesh", |s| s.instances[0].world_from_mesh = DAffine3::ZERO),
+        ("instances[0]", |s| s.instances[0].world_from_mesh.translation.x = 1e13),
         ("materials[0].base_color_texture", |s| {
             s.materials[0].base_color_texture = Some(TextureId(0));
         }),

@@ -10,10 +10,7 @@ pub(crate) fn nobody(_rows: u64) {}
 
 /// A scene with one plain material.
 pub(crate) fn scene(meshes: Vec<Mesh>, instances: &[(usize, DAffine3)]) -> Scene {
-    let place = |&(mesh, world_from_mesh)| Instance {
-        mesh,
-        world_from_mesh,
-    };
+    let place = |&(mesh, world_from_mesh)| Instance { mesh, world_from_mesh };
     Scene {
         meshes,
         instances: instances.iter().map(place).collect(),
@@ -39,9 +36,7 @@ pub(crate) fn soup(triangles: &[[Vec3; 3]]) -> Mesh {
     Mesh {
         normals: vec![Vec3::Y; positions.len()],
         positions,
-        triangles: (0..count / 3)
-            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-            .collect(),
+        triangles: (0..count / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         ..Mesh::default()
     }
 }
@@ -93,12 +88,7 @@ pub(crate) fn sphere(center: Vec3, radius: f32, rings: u32) -> Mesh {
         }
     }
     let normals = positions.iter().map(|p| (p - center).normalize()).collect();
-    Mesh {
-        positions,
-        normals,
-        triangles,
-        ..Mesh::default()
-    }
+    Mesh { positions, normals, triangles, ..Mesh::default() }
 }
 
 pub(crate) fn at(x: f64, y: f64, z: f64) -> DAffine3 {
@@ -107,16 +97,8 @@ pub(crate) fn at(x: f64, y: f64, z: f64) -> DAffine3 {
 
 pub(crate) fn camera(eye: DVec3, target: DVec3, image: [u32; 2]) -> Camera {
     let fov_y_rad = 60f64.to_radians();
-    Camera::look_at(LookAt {
-        eye,
-        target,
-        up: DVec3::Y,
-        fov_y_rad,
-        near: 0.01,
-        far: 1e4,
-        image,
-    })
-    .unwrap()
+    Camera::look_at(LookAt { eye, target, up: DVec3::Y, fov_y_rad, near: 1e-5, far: 1e6, image })
+        .unwrap()
 }
 
 /// An even map of the square of half-width `half` across the light around `center`, of depth range
@@ -162,9 +144,7 @@ pub(crate) fn below(tracer: &Tracer<'_>, point: DVec3) -> Surface {
 /// The first surface in `direction` of `point`.
 pub(crate) fn towards(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> Surface {
     let ray = umbrage_trace::Ray { origin, direction };
-    let hit = tracer
-        .closest(ray, [0.0, f64::INFINITY])
-        .expect("a surface there");
+    let hit = tracer.closest(ray, [0.0, f64::INFINITY]).expect("a surface there");
     tracer.surface(&hit, direction)
 }
 
@@ -189,11 +169,7 @@ impl Random {
     }
 
     pub(crate) fn vector(&mut self, half: f64) -> DVec3 {
-        DVec3::new(
-            self.between(-half, half),
-            self.between(-half, half),
-            self.between(-half, half),
-        )
+        DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
     }
 
     pub(crate) fn direction(&mut self) -> DVec3 {
