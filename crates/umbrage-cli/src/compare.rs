@@ -7,6 +7,7 @@ use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene, tell_notices};
 use crate::spec::Technique;
 use anyhow::{Context, Result};
+use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -63,7 +64,8 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let height = u64::from(onlooker.camera.image()[1]);
     tell_notices(&scene);
     args.execution.announce();
-    let progress = Progress::new(rows_of_maps + height * (2 + plans.len() as u64), quiet);
+    // Of the picture: what is seen, the truth; each technique's lookups and measuring.
+    let progress = Progress::new(rows_of_maps + height * (2 + 2 * plans.len() as u64), quiet);
     let mut contenders = Vec::new();
     for (technique, (plan, ms)) in args.shadows.iter().zip(&plans) {
         contenders.push(Contender::new(technique, plan, *ms, &tracer, &progress)?);
@@ -91,12 +93,14 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
         let seen =
             SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
         let truth_pictures = write_truth_pictures(path, &seen)?;
-        let mut pictures = Vec::new();
-        for (i, contender) in contenders.into_iter().enumerate() {
-            let (measured, written) = contender.finish(i + 1, path, &seen)?;
-            report.results.push(measured);
-            pictures.push(written);
-        }
+        let finished = contenders.into_par_iter().enumerate().map(|(i, contender)| {
+            let finished = contender.finish(i + 1, path, &seen);
+            progress.advance(height);
+            finished
+        });
+        let (results, pictures): (_, Vec<Pictures>) =
+            finished.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        report.results = results;
         write_report(
             path,
             &Page {

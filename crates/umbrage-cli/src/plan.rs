@@ -6,7 +6,7 @@ use crate::setup::{Onlooker, lamp, onlooker, open_scene, option_error, tell_noti
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;
-use umbrage::{Bounds, MapError, Planner};
+use umbrage::{Bounds, MapError, Planner, Warp};
 
 #[derive(Serialize)]
 struct PlanJson {
@@ -105,10 +105,12 @@ fn table(plan: &umbrage::Plan, onlooker: &Onlooker, args: &args::Plan) -> String
         let [w, h] = map.resolution;
         let [near, far] = map.split;
         line(format_args!("map {i}: {w}x{h} texels, {near} to {far} metres"));
-        match map.lambda {
-            Some(lambda) => line(format_args!("  warp            λ = {lambda:.6} m")),
-            None => line(format_args!("  warp            none, or not a one-point perspective")),
-        }
+        let warp = match (map.lambda, args.shadows.options.warp) {
+            (Some(lambda), _) => format!("λ = {lambda:.6} m"),
+            (None, Warp::Psm) => "the viewer's own perspective".into(),
+            (None, _) => "none".into(),
+        };
+        line(format_args!("  warp            {warp}"));
         let e = map.error;
         line(format_args!(
             "  pixels a texel  {:.4} across, {:.4} along, {:.4} in the worst direction, at most",

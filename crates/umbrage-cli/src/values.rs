@@ -40,7 +40,7 @@ pub(crate) fn distance(text: &str) -> Result<f64> {
 /// An angle in degrees that a picture can have.
 pub(crate) fn field_of_view(text: &str) -> Result<f64> {
     match text.parse() {
-        Ok(degrees) if degrees >= 0.01 && degrees <= 179.0 => Ok(degrees),
+        Ok(degrees) if (0.01..=179.0).contains(&degrees) => Ok(degrees),
         _ => bail!("must be an angle of 0.01 to 179 degrees, as in 60"),
     }
 }
