@@ -105,19 +105,9 @@ fn nearest_lit(map: &ShadowMap, receiver: &Receiver, i: i32, j: i32) -> f64 {
     if rise.is_nan() {
         return f64::NEG_INFINITY;
     }
-    let plane = receiver.depth + rise;
-    let r = match *VARIANT {
-        0 => plane,
-        1 => plane.min(receiver.depth),
-        2 => receiver.depth,
-        _ => plane.max(receiver.depth),
-    };
-    r.min(1.0) - f64::from(f32::EPSILON) / 4.0 - rise.abs() * 1e-12
+    let rounding = f64::from(f32::EPSILON) / 4.0 + rise.abs() * 1e-12;
+    receiver.depth.min(receiver.depth + rise).min(1.0) - rounding
 }
-
-static VARIANT: std::sync::LazyLock<u32> = std::sync::LazyLock::new(|| {
-    std::env::var("VARIANT").ok().and_then(|v| v.parse().ok()).unwrap_or(1)
-});
 
 /// One side of a box filter: the texels it covers, the first and the last in part.
 struct Span {
