@@ -88,10 +88,14 @@ impl Browser {
 
     /// Left, top, width and height of the element in the window, after scrolling it into view.
     pub(crate) fn rect(&mut self, selector: &str) -> [f64; 4] {
+        self.eval(&format!(
+            "document.querySelector({selector:?}).scrollIntoView({{block: 'center', behavior: 'instant'}})"
+        ));
+        // Until it is painted there, a touch would still go to where it was.
+        self.wait_for_paint();
         let rect = self.eval(&format!(
-            "(() => {{ const e = document.querySelector({selector:?}); \
-             e.scrollIntoView({{block: 'center', behavior: 'instant'}}); \
-             const r = e.getBoundingClientRect(); return [r.x, r.y, r.width, r.height] }})()"
+            "(() => {{ const r = document.querySelector({selector:?}).getBoundingClientRect(); \
+             return [r.x, r.y, r.width, r.height] }})()"
         ));
         serde_json::from_value(rect).unwrap()
     }
@@ -152,6 +156,13 @@ impl Browser {
         let shot = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let png = BASE64_STANDARD.decode(shot["data"].as_str().unwrap()).unwrap();
         image::load_from_memory(&png).unwrap().to_rgb8()
+    }
+
+    /// Two frames later everything asked for before has been painted.
+    fn wait_for_paint(&mut self) {
+        self.eval(
+            "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))",
+        );
     }
 
     /// Sends a command and waits for its answer, taking in what happens meanwhile.

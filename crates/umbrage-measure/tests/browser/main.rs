@@ -99,8 +99,8 @@ fn divider_moves_by_mouse_touch_and_keyboard() {
     browser.open(&index, [1280, 900], false);
     check_pictures(&mut browser, [64, 48]);
     let [x, y, w, h] = browser.rect("#stage");
-    // Off the middle, where neither the grip nor a name covers the picture.
-    let at = |percent: f64| [x + w * percent / 100.0, y + h * 0.2];
+    // Off the middle, where neither grip, magnifier nor a name covers the picture.
+    let at = |percent: f64| [x + w * percent / 100.0, y + h * 0.1];
     let value = "Number(document.querySelector('#divider').getAttribute('aria-valuenow'))";
 
     assert_eq!(seen(&mut browser, at(25.0)), RED);
@@ -128,7 +128,7 @@ fn divider_moves_by_mouse_touch_and_keyboard() {
 
     browser.open(&index, [360, 740], true);
     let [x, y, w, h] = browser.rect("#stage");
-    let at = |percent: f64| [x + w * percent / 100.0, y + h * 0.2];
+    let at = |percent: f64| [x + w * percent / 100.0, y + h * 0.1];
     browser.finger(&[at(50.0), at(45.0), at(30.0), at(10.0)]);
     assert_eq!(browser.eval(value), json!(10));
     assert_eq!(seen(&mut browser, at(25.0)), GREEN, "dragged to the left");
@@ -145,7 +145,7 @@ fn controls_choose_what_is_shown() {
     browser.open(&index, [1280, 900], false);
     check_pictures(&mut browser, [64, 48]);
     let [x, y, w, h] = browser.rect("#stage");
-    let (left, right) = ([x + w * 0.25, y + h * 0.2], [x + w * 0.75, y + h * 0.2]);
+    let (left, right) = ([x + w * 0.25, y + h * 0.1], [x + w * 0.75, y + h * 0.1]);
     let choose = |browser: &mut Browser, side: &str, value: u32| {
         browser.eval(&format!(
             "(() => {{ const s = document.getElementById({side:?}); s.value = {value}; \
@@ -242,7 +242,7 @@ fn magnifier_shows_the_same_place_of_all_techniques() {
     browser.open(&index, [360, 740], true);
     check_pictures(&mut browser, [640, 480]);
     let [x, y, w, h] = browser.rect("#stage");
-    browser.finger(&[[x + w * 0.2, y + h * 0.2]]);
+    browser.finger(&[[x + w * 0.2, y + h * 0.1]]);
     assert_eq!(tiles(&mut browser)[..2], [RED, GREEN]);
     // Far away again, and back by the button on the card: all is wrong, so its first corner counts.
     browser.rect("#stage");
