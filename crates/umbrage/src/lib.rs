@@ -18,8 +18,8 @@
 //! - *Local space* is world space moved by a plan's [`origin`](Plan::origin), so that single
 //!   precision suffices far from the world's origin.
 //! - *Light space* has +y towards the light, z perpendicular to it in the plane of view direction and
-//!   light, on the viewer's forward side, and x = y × z (Wimmer et al. 2004, §3.4). For a spot light
-//!   this is the space after the light's own perspective.
+//!   light, on the viewer's forward side, and x = z × y to his right (left-handed, as in Wimmer et al.
+//!   2004, §3.4). For a spot light this is the space after the light's own perspective.
 //! - *Shadow space* is (s, t, depth): s across and t along the warp's axis, both in [0, 1]; depth in
 //!   [0, 1] with 0 nearest the light. Texel (i, j) of a map of `res` texels has its centre at
 //!   ((i + ½)/res.x, (j + ½)/res.y).

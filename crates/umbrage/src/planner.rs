@@ -100,7 +100,8 @@ impl Planner {
             // choose a warp by; the errors reported do not depend on them.
             let vertices = self.body.vertices();
             seen.extend(self.body.edges().flat_map(|[a, b]| {
-                [0.25, 0.5, 0.75].map(|k| Seen::new(vertices[a].lerp(vertices[b], k), space, camera))
+                [0.25, 0.5, 0.75]
+                    .map(|k| Seen::new(vertices[a].lerp(vertices[b], k), space, camera))
             }));
         }
 
@@ -114,6 +115,8 @@ impl Planner {
                 (_, Some(scene)) => scene.relative_to(camera.eye()).corners().map(cover),
                 (_, None) => bounding_cube(camera, space).map(cover),
             });
+            // What is seen as well: its bounds were widened a little if they are flat.
+            self.covered.extend_from_slice(&self.seen);
             &self.covered
         } else {
             &self.seen
@@ -236,10 +239,7 @@ fn matrices(homography: DMat3, covered: &[Seen], space: &LightSpace) -> [DMat4; 
     let [x, z, w] = [0, 1, 2].map(|i| inverse.row(i)).map(|r| DVec4::new(r.x, r.y, 0.0, r.z));
     let y = w * middle - DVec4::new(0.0, 0.0, span, nearest);
     let light_from_shadow = DMat4::from_cols(x, y, z, w).transpose();
-    [
-        shadow_from_light * space.light_from_local(),
-        space.local_from_light() * light_from_shadow,
-    ]
+    [shadow_from_light * space.light_from_local(), space.local_from_light() * light_from_shadow]
 }
 
 fn light_plane_extent(covered: &[Seen]) -> f64 {

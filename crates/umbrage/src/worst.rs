@@ -16,13 +16,16 @@
 use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::ConvexBody;
-use crate::plan::{MapError, ShadowMap};
+use crate::plan::{MapError, Rows, ShadowMap};
 use glam::DVec3;
+use std::cmp::Ordering;
+use std::collections::{BinaryHeap, binary_heap::PeekMut};
 
 /// The reported maximum may exceed the true one by this share.
 const TOLERANCE: f64 = 0.005;
-/// Halvings after which a simplex is a point for all practical purposes.
-const MAX_DEPTH: u32 = 40;
+/// Halvings after which the bounds that are left are taken as they are. Views of some ten orders of
+/// magnitude between near and far get there; others need dozens.
+const MAX_SPLITS: usize = 1000;
 
 /// Values at a corner of a simplex.
 #[derive(Clone, Copy, Debug)]
@@ -41,22 +44,45 @@ struct Corner {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Simplex {
+struct Simplex {
     /// The third corner repeats the second on an edge.
     corners: [Corner; 3],
     is_edge: bool,
-    depth: u32,
+    /// Upper bounds of the errors.
+    bound: [f64; 3],
+    /// Largest ratio of a bound to the best value known when the bound was found.
+    urgency: f64,
 }
+
+impl Ord for Simplex {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.urgency.total_cmp(&other.urgency)
+    }
+}
+
+impl PartialOrd for Simplex {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Simplex {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Simplex {}
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch {
     corners: Vec<Corner>,
-    stack: Vec<Simplex>,
+    open: BinaryHeap<Simplex>,
 }
 
 /// Largest errors of `map` over `body` (local space), pixels per texel: never less than the true
-/// maximum, and at most half a per cent more.
+/// maximum, and at most half a per cent more in all but extreme views.
 pub(crate) fn worst_errors(
     map: &ShadowMap,
     body: &ConvexBody,
@@ -64,26 +90,29 @@ pub(crate) fn worst_errors(
     scratch: &mut Scratch,
 ) -> MapError {
     let search = Search { map, camera };
-    let Scratch { corners, stack } = scratch;
+    let Scratch { corners, open } = scratch;
     corners.clear();
     corners.extend(body.vertices().iter().filter_map(|&v| search.corner(v)));
     let mut best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
     // A corner that the map does not reach would be a fault of the fit.
     debug_assert_eq!(corners.len(), body.vertices().len());
     if corners.len() == body.vertices().len() {
-        stack.clear();
+        open.clear();
         let simplex =
-            |i: [usize; 3], is_edge| Simplex { corners: i.map(|i| corners[i]), is_edge, depth: 0 };
+            |i: [usize; 3], is_edge| search.simplex(i.map(|i| corners[i]), is_edge, &best);
         if search.edges_suffice() {
-            stack.extend(body.edges().map(|[a, b]| simplex([a, b, b], true)));
+            open.extend(body.edges().map(|[a, b]| simplex([a, b, b], true)));
         } else {
-            stack.extend(body.triangles().map(|t| simplex(t, false)));
+            open.extend(body.triangles().map(|t| simplex(t, false)));
         }
-        let mut bounds = best;
-        while let Some(simplex) = stack.pop() {
-            search.split(&simplex, &mut best, &mut bounds, stack);
+        for _ in 0..MAX_SPLITS {
+            let most_urgent = match open.peek_mut() {
+                Some(simplex) if simplex.urgency > 1.0 + TOLERANCE => PeekMut::pop(simplex),
+                _ => break,
+            };
+            search.split(&most_urgent, &mut best, open);
         }
-        best = larger(best, bounds);
+        best = open.iter().fold(best, |best, s| larger(best, s.bound));
     }
     let pixel = camera.pixel_width_per_depth();
     let [max_s, max_t, max] = best.map(|e| e / pixel);
@@ -121,28 +150,24 @@ impl Search<'_> {
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
     }
 
-    fn split(
-        &self,
-        simplex: &Simplex,
-        best: &mut [f64; 3],
-        bounds: &mut [f64; 3],
-        stack: &mut Vec<Simplex>,
-    ) {
-        let mut bound = self.bound(simplex);
-        if simplex.is_edge {
+    fn simplex(&self, corners: [Corner; 3], is_edge: bool, best: &[f64; 3]) -> Simplex {
+        let mut bound = self.bound(&corners);
+        if is_edge {
             // B's first column is constant and w²/z convex: corners have the largest m_s and m_t.
-            [bound[0], bound[1]] = [best[0], best[1]];
+            // With logarithmic rows A itself is affine, and corners have the largest of all.
+            let [a, b, _] = corners.map(|c| c.errors);
+            let at_corners = larger(a, b);
+            let exact = if self.map.rows == Rows::Even { 2 } else { 3 };
+            bound[..exact].copy_from_slice(&at_corners[..exact]);
         }
-        let is_open = |i: usize| bound[i] > best[i] * (1.0 + TOLERANCE);
-        if !(0..3).any(is_open) || simplex.depth >= MAX_DEPTH {
-            for i in 0..3 {
-                bounds[i] = bounds[i].max(bound[i].min(best[i] * (1.0 + TOLERANCE)));
-            }
-            return;
-        }
+        let urgency = [0, 1, 2].map(|i| bound[i] / best[i]).into_iter().fold(0.0, f64::max);
+        Simplex { corners, is_edge, bound, urgency }
+    }
+
+    /// Halves a simplex across its longest side.
+    fn split(&self, simplex: &Simplex, best: &mut [f64; 3], open: &mut BinaryHeap<Simplex>) {
         let [a, b, c] = simplex.corners;
-        let depth = simplex.depth + 1;
-        // Halve the longest side. View depth decides what "long" means: far away, less matters.
+        // View depth decides what "long" means: far away, less matters.
         let length = |u: &Corner, v: &Corner| u.p.distance_squared(v.p) / (u.z * v.z);
         let sides = [(a, b, c), (b, c, a), (c, a, b)];
         let (u, v, rest) = if simplex.is_edge {
@@ -153,22 +178,16 @@ impl Search<'_> {
             longest.copied().unwrap_or(sides[0])
         };
         // The point halfway in 1/z keeps the two halves' ranges of z alike.
-        let Some(m) = self.corner(u.p.lerp(v.p, u.z / (u.z + v.z))) else {
-            return;
-        };
+        let Some(m) = self.corner(u.p.lerp(v.p, u.z / (u.z + v.z))) else { return };
         *best = larger(*best, m.errors);
-        let child = |p: Corner, q: Corner| Simplex {
-            corners: [p, q, if simplex.is_edge { q } else { rest }],
-            is_edge: simplex.is_edge,
-            depth,
-        };
-        stack.push(child(u, m));
-        stack.push(child(m, v));
+        for (p, q) in [(u, m), (m, v)] {
+            let third = if simplex.is_edge { q } else { rest };
+            open.push(self.simplex([p, q, third], simplex.is_edge, best));
+        }
     }
 
     /// Upper bounds for s, t and worst over a simplex.
-    fn bound(&self, simplex: &Simplex) -> [f64; 3] {
-        let corners = &simplex.corners;
+    fn bound(&self, corners: &[Corner; 3]) -> [f64; 3] {
         let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
         let w_over_z = max(&|c| c.w / c.z);
         // m_t = w²/|N| with N = w² ∇t affine, whose length is at least its share along any fixed

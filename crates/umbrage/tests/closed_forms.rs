@@ -36,7 +36,10 @@ fn plan_view(camera: &Camera, theta: f64, warp: Warp) -> Plan {
 
 fn assert_close(measured: f64, expected: f64, tolerance: f64, what: &str) {
     let relative = (measured / expected - 1.0).abs();
-    assert!(relative < tolerance, "{what}: measured {measured}, expected {expected} ({relative:e} off)");
+    assert!(
+        relative < tolerance,
+        "{what}: measured {measured}, expected {expected} ({relative:e} off)"
+    );
 }
 
 /// m_s and m_t overhead at view depth z (W&P Eqs. 7, 8), without the resolutions.
@@ -94,10 +97,20 @@ fn logarithmic_rows_reach_the_optimum() {
     let expected_t = f64::from(IMAGE) / f64::from(RES[1]) * (F / N).ln() / (2.0 * PHI.tan());
     for z in [N, 3.0, 10.0, 60.0, F] {
         let error = map.perspective_error(&camera, DVec3::new(0.1 * z, -0.3 * z, -z)).unwrap();
-        assert_close(error.s, f64::from(IMAGE) / f64::from(RES[0]), 1e-6, "m_s is the same everywhere");
+        assert_close(
+            error.s,
+            f64::from(IMAGE) / f64::from(RES[0]),
+            1e-6,
+            "m_s is the same everywhere",
+        );
         assert_close(error.t, expected_t, 1e-6, "m_t is the same everywhere");
     }
-    assert_close(plan.storage_factor(), (F / N).ln() / (2.0 * PHI.tan()), 1e-6, "S̄ = ln(f/n)/(2 tan φ)");
+    assert_close(
+        plan.storage_factor(),
+        (F / N).ln() / (2.0 * PHI.tan()),
+        1e-6,
+        "S̄ = ln(f/n)/(2 tan φ)",
+    );
 }
 
 #[test]
@@ -183,7 +196,12 @@ fn adaptive_finds_the_optimum() {
         let product = |warp| 4.0 * plan_view(&camera, theta, warp).storage_factor();
         assert_close(product(Warp::Uniform), uniform, 5e-3, "M_q·M_p of uniform");
         let adaptive = Warp::Adaptive(Objective::Storage);
-        assert_close(product(adaptive), storage, 6e-3, &format!("M_q·M_p of adaptive at {degrees}°"));
+        assert_close(
+            product(adaptive),
+            storage,
+            6e-3,
+            &format!("M_q·M_p of adaptive at {degrees}°"),
+        );
         let mu = (F - N + (F + N) * PHI.tan() / theta.tan()) * theta.sin();
         let expected =
             (mu - 2.0 * (N * F).sqrt() * PHI.tan() * theta.cos()) / ((F / N).sqrt() - 1.0);
@@ -204,7 +222,12 @@ fn adaptive_finds_the_optimum() {
         let texels = plan.texels() as f64;
         let e_product = 4.0 * worst * texels / f64::from(IMAGE).powi(2);
         // The reference's λ came from a coarser search: ours may only be better.
-        assert_close(e_product, area, 1e-2, &format!("max E_q·E_p of adaptive(area) at {degrees}°"));
+        assert_close(
+            e_product,
+            area,
+            1e-2,
+            &format!("max E_q·E_p of adaptive(area) at {degrees}°"),
+        );
         assert!(e_product < area * 1.004, "adaptive(area) at {degrees}°: {e_product} > {area}");
     }
 }
@@ -221,7 +244,8 @@ fn warps_fade_as_the_view_turns_into_the_light() {
         Warp::Psm,
         Warp::Log,
     ] {
-        let strength = |theta: f64| plan_view(&camera, theta, warp).maps[0].lambda.map_or(0.0, f64::recip);
+        let strength =
+            |theta: f64| plan_view(&camera, theta, warp).maps[0].lambda.map_or(0.0, f64::recip);
         assert!(strength(0.0) < 1e-6, "{warp:?} looking along the light: {}", strength(0.0));
         assert!(strength(std::f64::consts::PI) < 1e-6, "{warp:?} against it");
         for theta in [1e-3, 1e-4, 1e-5] {

@@ -67,7 +67,8 @@ impl LightSpace {
     ) -> Self {
         // z came out of a difference that cancels as the view turns into the light.
         let z = (z - direction * direction.dot(z)).normalize();
-        let x = z.cross(direction);
+        // To the viewer's right: seen from the light the map is not mirrored.
+        let x = direction.cross(z);
         let row = |axis: DVec3| axis.extend(-axis.dot(apex.unwrap_or(DVec3::ZERO)));
         let (y, w) = match apex {
             None => (row(-direction), DVec4::W),

@@ -7,9 +7,9 @@ use glam::{DMat3, DVec3, DVec4, Vec4Swizzles};
 /// [0, 1]². `None` where no perspective from the light can see all of `vertices` (local space).
 ///
 /// After the viewer's perspective P the light is the point C = P·light: finite, inverted (C.w < 0) or
-/// still at infinity (C.w = 0). A picture taken from C along e is given by functionals that vanish at
-/// C, e_i·(C.w q.xyz − q.w C.xyz), and these pass through all three cases without a seam. They do not
-/// vary along a beam, so on the light plane they are a homography.
+/// still at infinity (C.w = 0). A picture taken from C is given by functionals that vanish at C,
+/// e·(C.w q.xyz − q.w C.xyz) up to scale, and these pass through all three cases without a seam.
+/// They do not vary along a beam, so on the light plane they are a homography.
 pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Option<DMat3> {
     let (n, f) = (camera.near(), camera.far());
     let forward = camera.forward();
@@ -44,9 +44,8 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
         .unwrap_or_else(|| (DVec3::Y - axis * axis.y).normalize());
     let across = up.cross(axis);
 
-    // The functionals over local space, as combinations of light space's rows.
-    let functional = |e: DVec3| {
-        let covector = DVec4::from((e * c.w).extend(-e.dot(c.xyz())));
+    // A functional over the perspective space as a combination of light space's rows.
+    let on_light_plane = |covector: DVec4| {
         let local = rows[0] * covector.x
             + rows[1] * covector.y
             + rows[2] * covector.z
@@ -58,7 +57,14 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
         };
         DVec3::new(x, z, w)
     };
-    let [s, t, w] = [across, up, axis].map(functional);
+    // Divided by C.w, so that neither vanishes nor changes sides where the light is at infinity. There
+    // C lies on the axis, and e·C is 0.
+    let sideways = |e: DVec3| {
+        let shift = if c.w == 0.0 { 0.0 } else { -e.dot(c.xyz()) / c.w };
+        on_light_plane(e.extend(shift))
+    };
+    let [s, t] = [across, up].map(sideways);
+    let w = on_light_plane((axis * c.w).extend(-axis.dot(c.xyz())));
     let rows = DMat3::from_cols(s, t, w);
     let s = if rows.determinant() < 0.0 { -s } else { s };
     Some(DMat3::from_cols(s, t, w).transpose())

@@ -1,0 +1,87 @@
+//! A steady frame allocates nothing.
+
+#![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
+
+use glam::DVec3;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Planner, SpotLight, Warp};
+
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: forwards to the system's allocator; counting touches a thread-local without a destructor.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|n| n.set(n.get() + 1));
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, ptr: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.dealloc(ptr, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+#[test]
+fn steady_frames_do_not_allocate() {
+    let camera = |frame: u32| {
+        let a = f64::from(frame) * 0.1;
+        let eye = DVec3::new(a.sin() * 10.0, 2.0, a.cos() * 10.0);
+        Camera::look_at(LookAt {
+            eye,
+            target: DVec3::new(0.0, 1.0 + a.sin(), 0.0),
+            up: DVec3::Y,
+            fov_y_rad: 1.0,
+            near: 0.1,
+            far: 200.0,
+            image: [1280, 720],
+        })
+        .unwrap()
+    };
+    let bounds =
+        Bounds::of_scene(Aabb::new(DVec3::new(-30.0, 0.0, -40.0), DVec3::new(35.0, 9.0, 28.0)));
+    let lights = [
+        Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) },
+        Light::Spot(SpotLight {
+            position: DVec3::new(0.0, 20.0, 0.0),
+            direction: DVec3::NEG_Y,
+            half_angle_rad: 0.6,
+            near: 0.1,
+            range: 50.0,
+        }),
+    ];
+    let warps = [
+        Warp::Unfocused,
+        Warp::Uniform,
+        Warp::Psm,
+        Warp::Lispsm,
+        Warp::Tsm { focus: None },
+        Warp::Adaptive(Objective::Storage),
+        Warp::Adaptive(Objective::Area),
+        Warp::Log,
+    ];
+    let mut planner = Planner::new();
+    let mut orbit = || {
+        for frame in 0..63 {
+            for light in &lights {
+                for warp in warps {
+                    let options = Options { warp, ..Options::default() };
+                    planner.plan(&camera(frame), light, &bounds, &options).unwrap();
+                }
+            }
+        }
+    };
+    orbit();
+    let before = ALLOCATIONS.with(Cell::get);
+    assert!(before > 0, "the counter counts");
+    orbit();
+    assert_eq!(ALLOCATIONS.with(Cell::get), before);
+}

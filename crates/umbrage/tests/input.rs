@@ -1,0 +1,353 @@
+//! Bad input gets an error that names the field; odd input gets a correct plan.
+
+mod common;
+
+use common::{WARPS, options};
+use glam::{DMat4, DVec2, DVec3, DVec4};
+use umbrage::{
+    Aabb, Bounds, Camera, ClipDepth, Error, Light, LookAt, Options, Planner, Size, SpotLight, Warp,
+};
+
+const VIEW: LookAt = LookAt {
+    eye: DVec3::new(1.0, 2.0, 3.0),
+    target: DVec3::new(4.0, 1.0, -3.0),
+    up: DVec3::Y,
+    fov_y_rad: 1.0,
+    near: 0.1,
+    far: 100.0,
+    image: [640, 480],
+};
+const SUN: Light = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) };
+const SPOT: SpotLight = SpotLight {
+    position: DVec3::new(0.0, 10.0, 0.0),
+    direction: DVec3::new(0.4, -1.0, -0.5),
+    half_angle_rad: 0.5,
+    near: 0.1,
+    range: 50.0,
+};
+
+fn field<T: std::fmt::Debug>(result: Result<T, Error>) -> &'static str {
+    match result {
+        Err(Error::Invalid { field, problem }) => {
+            assert!(problem.len() > 10, "a problem worth reading: {problem}");
+            field
+        }
+        other => panic!("expected an error, got {other:?}"),
+    }
+}
+
+#[test]
+fn cameras_name_what_is_wrong() {
+    let nan = f64::NAN;
+    let cases: [(LookAt, &str); 17] = [
+        (LookAt { eye: DVec3::splat(nan), ..VIEW }, "camera.eye"),
+        (LookAt { eye: DVec3::splat(1e13), ..VIEW }, "camera.eye"),
+        (LookAt { target: DVec3::INFINITY, ..VIEW }, "camera.target"),
+        (LookAt { target: VIEW.eye, ..VIEW }, "camera.target"),
+        (LookAt { up: DVec3::ZERO, ..VIEW }, "camera.up"),
+        (LookAt { up: DVec3::NAN, ..VIEW }, "camera.up"),
+        (LookAt { fov_y_rad: 0.0, ..VIEW }, "camera.fov_y_rad"),
+        (LookAt { fov_y_rad: -1.0, ..VIEW }, "camera.fov_y_rad"),
+        (LookAt { fov_y_rad: 3.1415927, ..VIEW }, "camera.fov_y_rad"),
+        (LookAt { fov_y_rad: nan, ..VIEW }, "camera.fov_y_rad"),
+        (LookAt { near: 0.0, ..VIEW }, "camera.near"),
+        (LookAt { near: nan, ..VIEW }, "camera.near"),
+        (LookAt { near: 100.0, ..VIEW }, "camera.far"),
+        (LookAt { near: 200.0, ..VIEW }, "camera.far"),
+        (LookAt { far: f64::INFINITY, ..VIEW }, "camera.far"),
+        (LookAt { image: [0, 10], ..VIEW }, "camera.image"),
+        (LookAt { image: [10, 70_000], ..VIEW }, "camera.image"),
+    ];
+    for (view, expected) in cases {
+        assert_eq!(field(Camera::look_at(view)), expected, "{view:?}");
+    }
+}
+
+#[test]
+fn lights_bounds_and_options_name_what_is_wrong() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let plan = |light: Light, bounds: Bounds, options: Options| {
+        field(Planner::new().plan(&camera, &light, &bounds, &options))
+    };
+    let none = Bounds::default();
+    for direction in [DVec3::ZERO, DVec3::NAN, DVec3::new(0.0, f64::INFINITY, 0.0)] {
+        let light = Light::Directional { direction };
+        assert_eq!(plan(light, none, Options::default()), "light.direction");
+    }
+    for (spot, expected) in [
+        (SpotLight { position: DVec3::NAN, ..SPOT }, "light.position"),
+        (SpotLight { direction: DVec3::ZERO, ..SPOT }, "light.direction"),
+        (SpotLight { half_angle_rad: 0.0, ..SPOT }, "light.half_angle_rad"),
+        (SpotLight { half_angle_rad: 1.6, ..SPOT }, "light.half_angle_rad"),
+        (SpotLight { near: 0.0, ..SPOT }, "light.near"),
+        (SpotLight { range: 0.1, ..SPOT }, "light.range"),
+        (SpotLight { range: f64::NAN, ..SPOT }, "light.range"),
+    ] {
+        assert_eq!(plan(Light::Spot(spot), none, Options::default()), expected);
+    }
+    let upside_down = Aabb { min: DVec3::ONE, max: DVec3::ZERO };
+    let bounds = Bounds { receivers: Some(upside_down), ..none };
+    assert_eq!(plan(SUN, bounds, Options::default()), "bounds.receivers");
+    let nan = Aabb { min: DVec3::ZERO, max: DVec3::NAN };
+    assert_eq!(
+        plan(SUN, Bounds { casters: Some(nan), ..none }, Options::default()),
+        "bounds.casters"
+    );
+    for (changed, expected) in [
+        (Options { size: Size::Budget(0), ..Options::default() }, "options.size"),
+        (Options { size: Size::Exact([0, 5]), ..Options::default() }, "options.size"),
+        (Options { size: Size::Exact([5, 9000]), ..Options::default() }, "options.size"),
+        (Options { max_side: 0, ..Options::default() }, "options.max_side"),
+        (Options { warp: Warp::Lambda(0.0), ..Options::default() }, "options.warp.lambda"),
+        (Options { warp: Warp::Lambda(f64::NAN), ..Options::default() }, "options.warp.lambda"),
+        (
+            Options { warp: Warp::Tsm { focus: Some(-1.0) }, ..Options::default() },
+            "options.warp.focus",
+        ),
+    ] {
+        assert_eq!(plan(SUN, none, changed), expected);
+    }
+}
+
+/// Lights along the view, from behind and in front, up along the view, narrow and huge ranges, one-texel
+/// budgets, flat and point-like worlds: every plan is finite and within its budget.
+#[test]
+fn odd_input_gives_sound_plans() {
+    let view = (VIEW.target - VIEW.eye).normalize();
+    let lights = [
+        Light::Directional { direction: view },
+        Light::Directional { direction: -view },
+        Light::Directional { direction: view + DVec3::X * 1e-13 },
+        Light::Directional { direction: DVec3::NEG_Y * 1e-200 },
+        Light::Directional { direction: DVec3::NEG_Y * 1e200 },
+        Light::Spot(SPOT),
+        Light::Spot(SpotLight { position: VIEW.eye, direction: view, ..SPOT }),
+        Light::Spot(SpotLight { position: VIEW.target, direction: -view, ..SPOT }),
+    ];
+    let views = [
+        VIEW,
+        LookAt { up: view, ..VIEW },
+        LookAt { near: 99.99, ..VIEW },
+        LookAt { near: 1e-6, far: 1e9, ..VIEW },
+        LookAt { eye: VIEW.eye + DVec3::X * 1e5, target: VIEW.target + DVec3::X * 1e5, ..VIEW },
+        LookAt { fov_y_rad: 3.0, image: [1, 65536], ..VIEW },
+    ];
+    let floor = Aabb::new(DVec3::new(-1e3, 0.0, -1e3), DVec3::new(1e3, 0.0, 1e3));
+    let point = Aabb::new(VIEW.eye + view * 5.0, VIEW.eye + view * 5.0);
+    let behind = Aabb::new(VIEW.eye - view * 9.0, VIEW.eye - view * 8.0);
+    let worlds = [
+        Bounds::default(),
+        Bounds::of_scene(floor),
+        Bounds::of_scene(point),
+        Bounds::of_scene(behind),
+        Bounds::of_scene(Aabb::EMPTY),
+        Bounds { receivers: None, casters: Some(floor) },
+    ];
+    let mut planner = Planner::new();
+    for look in views {
+        let camera = Camera::look_at(look).unwrap();
+        for light in lights {
+            for bounds in worlds {
+                for (name, warp) in WARPS {
+                    for size in [Size::Budget(1), Size::Budget(1 << 20), Size::Exact([3, 5])] {
+                        let options = Options { size, ..options(warp) };
+                        let what = format!("{name} {size:?} {look:?} {light:?} {bounds:?}");
+                        let plan = planner.plan(&camera, &light, &bounds, &options).expect(&what);
+                        assert_eq!(plan.maps.len(), 1);
+                        assert!(
+                            plan.theta_rad.is_finite() && plan.storage_factor().is_finite(),
+                            "{what}"
+                        );
+                        let map = &plan.maps[0];
+                        assert!(map.shadow_from_local.is_finite(), "{what}");
+                        assert!(map.local_from_shadow.is_finite(), "{what}");
+                        assert!(map.shadow_from_local_f32().is_finite(), "{what}");
+                        assert!(map.lambda.is_none_or(|l| l > 0.0 && l.is_finite()), "{what}");
+                        let e = map.error;
+                        assert!(
+                            [e.max_s, e.max_t, e.max].iter().all(|e| e.is_finite()),
+                            "{what}: {e:?}"
+                        );
+                        match size {
+                            Size::Budget(budget) => assert!(map.texels() <= budget, "{what}"),
+                            Size::Exact(size) => assert!(map.is_empty() || map.resolution == size),
+                        }
+                        if map.is_empty() {
+                            assert!(
+                                bounds.receivers.is_some() || matches!(light, Light::Spot(_)),
+                                "{what}"
+                            );
+                            assert!(!map.may_cast(floor));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_sees_nothing_gets_an_empty_plan() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let behind = Aabb::new(DVec3::new(-50.0, 0.0, 50.0), DVec3::new(-40.0, 10.0, 60.0));
+    for (name, warp) in WARPS {
+        let mut planner = Planner::new();
+        let plan = planner.plan(&camera, &SUN, &Bounds::of_scene(behind), &options(warp)).unwrap();
+        assert!(plan.maps.iter().all(umbrage::ShadowMap::is_empty), "{name}");
+        assert_eq!((plan.texels(), plan.storage_factor()), (0, 0.0));
+        assert!(plan.maps[0].footprint(VIEW.target).is_none());
+    }
+}
+
+/// A camera from matrices is the camera from eye and target, whatever the matrices' conventions.
+#[test]
+fn cameras_from_any_engines_matrices() {
+    let expected = Camera::look_at(VIEW).unwrap();
+    let pose = |left_handed: bool| {
+        let (r, u, f) = (expected.right(), expected.up(), expected.forward());
+        let back = if left_handed { f } else { -f };
+        DMat4::from_cols(r.extend(0.0), u.extend(0.0), back.extend(0.0), VIEW.eye.extend(1.0))
+    };
+    let (n, f) = (VIEW.near, VIEW.far);
+    let y = 1.0 / (VIEW.fov_y_rad / 2.0).tan();
+    let x = y * 480.0 / 640.0;
+    // Depth = a + b/distance.
+    let projection = |sign: f64, a: f64, b: f64| {
+        DMat4::from_cols(
+            DVec4::new(x, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, y, 0.0, 0.0),
+            DVec4::new(0.0, 0.0, a * sign, sign),
+            DVec4::new(0.0, 0.0, b, 0.0),
+        )
+    };
+    let zero_to_one = (f / (f - n), -n * f / (f - n));
+    let reversed = (-n / (f - n), n * f / (f - n));
+    let open_gl = ((f + n) / (f - n), -2.0 * n * f / (f - n));
+    let cases = [
+        ("0 to 1", -1.0, zero_to_one, ClipDepth::ZeroToOne, None),
+        ("0 to 1, left-handed", 1.0, zero_to_one, ClipDepth::ZeroToOne, None),
+        ("reversed", -1.0, reversed, ClipDepth::ZeroToOne, None),
+        ("OpenGL", -1.0, open_gl, ClipDepth::MinusOneToOne, None),
+        ("infinite", -1.0, (1.0, -n), ClipDepth::ZeroToOne, Some(f)),
+        ("infinite, reversed", -1.0, (0.0, n), ClipDepth::ZeroToOne, Some(f)),
+        ("infinite, reversed, left-handed", 1.0, (0.0, n), ClipDepth::ZeroToOne, Some(f)),
+    ];
+    for (name, sign, (a, b), depth, distance) in cases {
+        let camera = Camera::from_matrices(
+            pose(sign > 0.0),
+            projection(sign, a, b),
+            depth,
+            distance,
+            VIEW.image,
+        )
+        .unwrap_or_else(|e| panic!("{name}: {e}"));
+        for p in [DVec3::new(2.0, 1.5, 0.0), DVec3::new(3.0, -1.0, -40.0)] {
+            let (a, b) = (camera.pixel(p).unwrap(), expected.pixel(p).unwrap());
+            assert!(a.distance(b) < 1e-8, "{name}: {a} {b}");
+        }
+        assert!((camera.near() / n - 1.0).abs() < 1e-9, "{name}: near {}", camera.near());
+        assert!((camera.far() / f - 1.0).abs() < 1e-6, "{name}: far {}", camera.far());
+    }
+    let infinite = projection(-1.0, 0.0, n);
+    let no_distance =
+        Camera::from_matrices(pose(false), infinite, ClipDepth::ZeroToOne, None, VIEW.image);
+    assert_eq!(field(no_distance), "camera.shadow_distance");
+    let scaled = pose(false) * DMat4::from_scale(DVec3::splat(2.0));
+    let bad = Camera::from_matrices(scaled, infinite, ClipDepth::ZeroToOne, Some(9.0), VIEW.image);
+    assert_eq!(field(bad), "camera.world_from_view");
+    let flat = DMat4::from_scale(DVec3::new(1.0, 1.0, 0.5));
+    let bad = Camera::from_matrices(pose(false), flat, ClipDepth::ZeroToOne, Some(9.0), VIEW.image);
+    assert_eq!(field(bad), "camera.clip_from_view");
+    let mirrored = pose(true);
+    let bad =
+        Camera::from_matrices(mirrored, infinite, ClipDepth::ZeroToOne, Some(9.0), VIEW.image);
+    assert_eq!(field(bad), "camera.world_from_view");
+}
+
+/// An off-centre projection (one eye of a headset, say) sees what its matrix says.
+#[test]
+fn off_centre_cameras() {
+    let matrix = DMat4::from_cols(
+        DVec4::new(1.2, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, 1.1, 0.0, 0.0),
+        DVec4::new(0.25, -0.1, -1.001, -1.0),
+        DVec4::new(0.0, 0.0, -0.1001, 0.0),
+    );
+    let camera =
+        Camera::from_matrices(DMat4::IDENTITY, matrix, ClipDepth::ZeroToOne, None, [200, 100])
+            .unwrap();
+    for p in [DVec3::new(0.3, 0.4, -2.0), DVec3::new(-1.0, -0.3, -5.0)] {
+        let clip = matrix * p.extend(1.0);
+        let ndc = clip.truncate() / clip.w;
+        let expected = DVec2::new((ndc.x + 1.0) * 100.0, (1.0 - ndc.y) * 50.0);
+        let pixel = camera.pixel(p).unwrap();
+        assert!(pixel.distance(expected) < 1e-9, "{pixel} {expected}");
+        let back = camera.ray(pixel) * camera.depth(p);
+        assert!(back.distance(p) < 1e-9);
+    }
+}
+
+/// Landmarks of the picture and of the map: where corners and centres go.
+#[test]
+fn landmarks() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let middle = camera.pixel(VIEW.target).unwrap();
+    assert!(middle.distance(DVec2::new(320.0, 240.0)) < 1e-9);
+    assert!(camera.pixel(VIEW.eye - camera.forward()).is_none());
+    let right = camera.pixel(VIEW.target + camera.right()).unwrap();
+    assert!(right.x > 321.0 && (right.y - 240.0).abs() < 1e-9);
+    let above = camera.pixel(VIEW.target + camera.up()).unwrap();
+    assert!(above.y < 239.0 && (above.x - 320.0).abs() < 1e-9);
+
+    // Overhead sun: the near end of the view lies at t = 0, the far end at t = 1, right at large s, and
+    // what is higher is nearer the light.
+    let level = LookAt { eye: DVec3::ZERO, target: DVec3::NEG_Z, ..VIEW };
+    let camera = Camera::look_at(level).unwrap();
+    let light = Light::Directional { direction: DVec3::NEG_Y };
+    for (name, warp) in WARPS {
+        let mut planner = Planner::new();
+        let plan = planner.plan(&camera, &light, &Bounds::default(), &options(warp)).unwrap();
+        let map = &plan.maps[0];
+        let at = |x: f64, y: f64, z: f64| map.project(DVec3::new(x, y, z)).unwrap();
+        if warp != Warp::Unfocused {
+            assert!(at(0.0, 0.0, -0.1).y.abs() < 1e-9, "{name}: near");
+            assert!((at(0.0, 0.0, -100.0).y - 1.0).abs() < 1e-9, "{name}: far");
+            assert!(at(0.0, 0.0, -3.0).y > at(0.0, 0.0, -2.0).y, "{name}");
+            assert!(at(1.0, 0.0, -50.0).x > at(-1.0, 0.0, -50.0).x, "{name}");
+            assert!((at(0.0, 0.0, -50.0).x - 0.5).abs() < 1e-9, "{name}: centre");
+        }
+        assert!(at(0.0, 1.0, -50.0).z < at(0.0, -1.0, -50.0).z, "{name}: depth");
+        let beam = map.beam(at(0.3, 0.0, -20.0).truncate()).unwrap();
+        assert!(
+            beam.direction.distance(DVec3::NEG_Y) < 1e-9,
+            "{name}: beams travel with the light"
+        );
+    }
+}
+
+/// What single precision takes away near the eye stays far below a texel, 100 km from the world's
+/// origin too.
+#[test]
+fn single_precision_is_enough_far_from_the_origin() {
+    let far_away = DVec3::new(1e5, 0.0, -1e5);
+    let look = LookAt { eye: VIEW.eye + far_away, target: VIEW.target + far_away, ..VIEW };
+    let camera = Camera::look_at(look).unwrap();
+    for (name, warp) in WARPS {
+        let mut planner = Planner::new();
+        let plan = planner.plan(&camera, &SUN, &Bounds::default(), &options(warp)).unwrap();
+        let map = &plan.maps[0];
+        for depth in [0.2, 1.0, 10.0, 90.0] {
+            for pixel in
+                [DVec2::new(10.0, 10.0), DVec2::new(320.0, 240.0), DVec2::new(600.0, 470.0)]
+            {
+                let local = camera.ray(pixel) * depth;
+                let exact = map.project(plan.origin + local).unwrap();
+                let h = map.shadow_from_local_f32() * local.as_vec3().extend(1.0);
+                let single = h.truncate() / h.w;
+                let off = (single.as_dvec3() - exact).truncate().abs()
+                    * DVec2::new(map.resolution[0].into(), map.resolution[1].into());
+                assert!(off.max_element() < 0.02, "{name}: {off} texels off at depth {depth}");
+            }
+        }
+    }
+}
