@@ -158,6 +158,26 @@ impl MeshBuilder {
         self
     }
 
+    /// A wing from the origin along +x, its leading edge towards −z: an airfoil 12% thick (NACA
+    /// 0012) that tapers from the first `chord` to the second and rises by `rise` a metre.
+    pub(super) fn wing(&mut self, span: f32, chord: [f32; 2], rise: f32) -> &mut Self {
+        self.surface([28, 14], |u, v| {
+            let v = v.clamp(0.0, 1.0);
+            let a = -u * TAU;
+            let c = 0.5 + 0.5 * a.cos();
+            let thickness = 0.6
+                * (0.2969 * c.sqrt() - 0.126 * c - 0.3516 * c * c + 0.2843 * c.powi(3)
+                    - 0.1036 * c.powi(4));
+            // Rounded and thin at the tip.
+            let tip = (1.0 - v.powi(8)).max(0.0).sqrt();
+            let length = (chord[0] + (chord[1] - chord[0]) * v) * (0.35 + 0.65 * tip);
+            let lead = 0.25 * (chord[0] - length);
+            let y = thickness * length * tip * a.sin().signum();
+            Vec3::new(span * v, y + rise * span * v, lead + c * length)
+        });
+        self
+    }
+
     /// A round bar between two points.
     pub(super) fn bar(&mut self, from: Vec3, to: Vec3, radius: f32, sides: u32) -> &mut Self {
         self.tube(&[from, to], &[radius; 2], sides)

@@ -1,5 +1,6 @@
 //! Scenes made by rule.
 
+mod airfield;
 pub mod closed_form;
 mod fence;
 mod grove;
@@ -7,6 +8,7 @@ mod mesh_builder;
 mod plants;
 mod stage;
 mod statues;
+mod town;
 
 use crate::error::SceneError;
 use crate::types::Scene;
@@ -29,6 +31,22 @@ pub struct BuiltinInfo {
 }
 
 const BUILTINS: &[BuiltinInfo] = &[
+    BuiltinInfo {
+        name: "town",
+        about: "A street of houses, lamps and trees, hundreds of metres deep, seen from its pavement",
+        size_means: "pairs of houses along the street",
+        default_size: 28,
+        max_size: 3000,
+        build: town::town,
+    },
+    BuiltinInfo {
+        name: "airfield",
+        about: "Planes with struts, wires and propellers before hangars and a runway",
+        size_means: "planes",
+        default_size: 15,
+        max_size: 4000,
+        build: airfield::airfield,
+    },
     BuiltinInfo {
         name: "statues",
         about: "Ornate statues, evenly spaced on a plane",
