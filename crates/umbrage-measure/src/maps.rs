@@ -86,7 +86,11 @@ pub fn texel_map(texel: &Image<[f32; 2]>, picture: &Image<Rgb>) -> Result<Image<
     const PERIOD: f32 = 5.0;
     const LINE: Rgb = FALSE_LIGHT;
     /// Width of a line, pixels.
-    const WIDTH: f32 = 1.5;
+    const WIDTH: f32 = 1.2;
+    /// Lines per pixel from where on they fade, and at which they are gone.
+    const FADE: [f32; 2] = [1.0 / 6.0, 1.0 / 3.0];
+    /// What is left of them then.
+    const TINT: f32 = 0.3;
     picture.check_like(texel, "picture")?;
     Image::from_fn(texel.size(), |x, y| {
         let here = *texel.at(x, y);
@@ -99,10 +103,8 @@ pub fn texel_map(texel: &Image<[f32; 2]>, picture: &Image<Rgb>) -> Result<Image<
             let phase = here[axis] / PERIOD;
             let from_line_px = (phase - phase.round()).abs() / per_pixel.max(1e-6);
             let line = (WIDTH / 2.0 + 0.5 - from_line_px).clamp(0.0, 1.0);
-            // From 4 pixels between lines on, show what they would cover on average.
-            let even = (WIDTH * per_pixel).min(1.0);
-            let fade = ((per_pixel - 0.25) / 0.25).clamp(0.0, 1.0);
-            line + (even - line) * fade
+            let fade = ((per_pixel - FADE[0]) / (FADE[1] - FADE[0])).clamp(0.0, 1.0);
+            line + (TINT - line) * fade
         });
         mix(below, LINE, cover.fold(0.0, f32::max))
     })
@@ -131,7 +133,7 @@ fn dimmed(color: Rgb, counted: bool) -> Rgb {
 }
 
 /// Rec. 709 luma of sRGB values, 0 ..= 255.
-fn luma([r, g, b]: Rgb) -> f32 {
+pub(crate) fn luma([r, g, b]: Rgb) -> f32 {
     0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b)
 }
 

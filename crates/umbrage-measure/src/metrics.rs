@@ -101,7 +101,8 @@ pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<Err
 }
 
 /// The centre of the square of 32×32 pixels in which `technique` is most wrong (largest sum of
-/// |visibility − truth|): a place worth a close look. `None` if it is right everywhere.
+/// |technique − truth|): a place worth a close look. `None` if it is right everywhere. Takes
+/// visibilities, or any other values in 0 ..= 1 such as the pictures' brightness.
 ///
 /// # Errors
 /// As [`measure`].

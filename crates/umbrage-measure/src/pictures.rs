@@ -1,5 +1,6 @@
 //! The pictures of a comparison, as files beside its report.
 
+use crate::maps::luma;
 use crate::{
     Error, ErrorScale, Image, Rgb, difference_map, error_map, grey, worst_spot, write_png,
 };
@@ -46,7 +47,8 @@ pub struct Pictures {
     pub partition: Option<String>,
     /// [`texel_map`](crate::texel_map).
     pub texels: Option<String>,
-    /// [`worst_spot`], column and row.
+    /// Where the picture is most visibly wrong, column and row ([`worst_spot`] by brightness; a wrong
+    /// visibility where light just grazes a surface hardly shows).
     pub worst_spot: Option<[u32; 2]>,
 }
 
@@ -86,10 +88,13 @@ pub fn write_pictures(
 ) -> Result<Pictures, Error> {
     let &Seen { color, visibility, error_px, .. } = seen;
     let counted = truth.counted;
-    let spot = worst_spot(truth.visibility, visibility, counted)?;
+    error_px.check_like(truth.visibility, "error")?;
     let difference = difference_map(truth.visibility, visibility, counted, truth.color)?;
     let error = error_map(error_px, counted, truth.color, scale)?;
-    color.check_like(truth.visibility, "picture")?;
+    let others = [seen.partition, seen.texels].into_iter().flatten();
+    others.chain([color]).try_for_each(|p| p.check_like(truth.visibility, "picture"))?;
+    let brightness = |picture: &Image<Rgb>| picture.map(|&c| luma(c) / 255.0);
+    let spot = worst_spot(&brightness(truth.color), &brightness(color), counted)?;
 
     let name = |kind: &str| format!("{index:02}-{}-{kind}.png", file_stem(shadows));
     let write = |kind, image: &Image<Rgb>| {

@@ -217,7 +217,8 @@ impl Compared {
         let scale = ErrorScale::default();
         let (mut results, mut pictures) = (Vec::new(), Vec::new());
         for (i, Pictured { name, color, visibility, error_px }) in self.results.iter().enumerate() {
-            let seen = Seen { color, visibility, error_px, partition: None, texels: None };
+            let (partition, texels) = (Some(color), Some(color));
+            let seen = Seen { color, visibility, error_px, partition, texels };
             pictures.push(write_pictures(folder, i + 1, name, &seen, &truth, scale).unwrap());
             results.push(Measured {
                 shadows: name.clone(),
