@@ -22,7 +22,7 @@ use std::cmp::Ordering;
 use std::collections::{BinaryHeap, binary_heap::PeekMut};
 
 /// The reported maximum may exceed the true one by this share.
-const TOLERANCE: f64 = 0.005;
+const TOLERANCE: f64 = 0.01;
 /// Halvings after which the bounds that are left are taken as they are. Views of some ten orders of
 /// magnitude between near and far get there; others need dozens.
 const MAX_SPLITS: usize = 1000;
@@ -82,7 +82,7 @@ pub(crate) struct Scratch {
 }
 
 /// Largest errors of `map` over `body` (local space), pixels per texel: never less than the true
-/// maximum, and at most half a per cent more in all but extreme views.
+/// maximum, and at most one per cent more in all but extreme views.
 pub(crate) fn worst_errors(
     map: &ShadowMap,
     body: &ConvexBody,

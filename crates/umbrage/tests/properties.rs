@@ -59,7 +59,7 @@ proptest! {
             };
             // A spot light's texels are up to ten times as narrow at the caster.
             let metres = 1e-14 * (config.camera.eye().length() + reach);
-            let [texel_s, texel_t] = [error.s, error.t].map(|e| 1e-6 + metres / (e * pixel));
+            let [texel_s, texel_t] = [error.s, error.t].map(|e| 1e-4 + metres / (e * pixel));
             prop_assert!(((casts - shadow).x * res_s).abs() < texel_s, "{name}: {casts} from {shadow}");
             prop_assert!(((casts - shadow).y * res_t).abs() < texel_t, "{name}: {casts} from {shadow}");
             prop_assert!(casts.z < shadow.z, "{name}: caster at depth {} over {}", casts.z, shadow.z);
@@ -82,8 +82,8 @@ proptest! {
         };
         let uniform = storage(Warp::Uniform);
         let adaptive = storage(Warp::Adaptive(Objective::Storage));
-        // The reported maxima are known to half a per cent each.
-        prop_assert!(adaptive <= uniform * 1.011, "{adaptive} > {uniform}");
+        // The reported maxima under spot lights are known to one per cent each.
+        prop_assert!(adaptive <= uniform * 1.021, "{adaptive} > {uniform}");
     }
 }
 

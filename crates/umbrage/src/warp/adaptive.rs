@@ -37,22 +37,28 @@ pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective
     if cost(0.0) <= cost(omega) { 0.0 } else { omega.exp_m1() }
 }
 
-/// Logarithm of the quantity to make small.
+/// The quantity to make small.
 fn cost(family: &OnePoint, seen: &[Seen], objective: Objective, nu: f64) -> f64 {
-    let (lo, hi) = family.extent(nu, seen);
+    let per_z = nu / family.mu;
+    let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut s, mut t, mut area) = (0f64, 0f64, 0f64);
     for p in seen {
-        let w = family.w(nu, p.xz.y);
+        let w = 1.0 + per_z * (p.xz.y - family.z0);
+        let x = (p.xz.x - family.center_x) / w;
+        (lo, hi) = (lo.min(x), hi.max(x));
         let (at_s, at_t) = (p.base * w, p.height * w * w);
         s = s.max(at_s);
         t = t.max(at_t);
         area = area.max(at_s * at_t);
     }
-    let common = ((hi - lo) / (1.0 + nu)).ln();
+    let per_row = 1.0 / (1.0 + nu);
     match objective {
         // Overhead, every λ from n to n + √(n f) needs the same storage. Of equals, the least
-        // max m_t is the best; it also keeps λ from jumping.
-        Objective::Storage => common + s.ln() + t.ln() + 1e-6 * (t / (1.0 + nu)).ln(),
-        Objective::Area => common + area.ln(),
+        // max m_t is the best; it also keeps λ from jumping. t is in units of its own size
+        // at the view's nearest point, where it is largest without a warp.
+        Objective::Storage => {
+            (hi - lo) * per_row * s * t * (1.0 + 1e-6 * t * per_row * family.nearest)
+        }
+        Objective::Area => (hi - lo) * per_row * area,
     }
 }
