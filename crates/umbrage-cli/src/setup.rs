@@ -10,8 +10,16 @@ use umbrage_scene::{Scene, SceneCamera, builtins};
 /// Light of an afternoon: 45° high, from the side and a little from behind a viewer who looks along −z.
 const AFTERNOON_SUN: DVec3 = DVec3::new(-0.6, -1.0, -0.8);
 
-/// Vertical field of view where neither user nor scene gives one, degrees.
-const DEFAULT_FOV_DEG: f64 = 60.0;
+/// What a view has of itself where neither user nor scene says more.
+const DEFAULT_VIEW: LookAt = LookAt {
+    eye: DVec3::ZERO,
+    target: DVec3::NEG_Z,
+    up: DVec3::Y,
+    fov_y_rad: std::f64::consts::FRAC_PI_3,
+    near: 0.1,
+    far: 100.0,
+    image: [960, 540],
+};
 
 /// A camera, and where it came from.
 pub(crate) struct Onlooker {
@@ -54,8 +62,7 @@ pub(crate) fn tell_notices(scene: &Scene) {
 
 fn read_scene(name: &str) -> Result<Scene> {
     let path = Path::new(name);
-    if path.exists() {
-        ensure!(!path.is_dir(), "SCENE: {name} is a folder, must be a .gltf or .glb file");
+    if path.exists() && !path.is_dir() {
         return Ok(umbrage_scene::load(path)?);
     }
     let (builtin, size) = match name.split_once(':') {
@@ -64,6 +71,7 @@ fn read_scene(name: &str) -> Result<Scene> {
     };
     let names: Vec<&str> = builtins().iter().map(|b| b.name).collect();
     if !names.contains(&builtin) {
+        ensure!(!path.is_dir(), "SCENE: {name} is a folder, must be a .gltf or .glb file");
         let is_path = name.contains(['/', '\\', '.']);
         ensure!(!is_path, "SCENE: there is no file {name}");
         bail!(
@@ -85,23 +93,26 @@ fn read_scene(name: &str) -> Result<Scene> {
 /// The view that the arguments ask for. What they leave open comes from the scene's camera; a view
 /// with an eye and a target of its own owes the scene only the depth range.
 pub(crate) fn onlooker(args: &ViewArgs, scene: Option<&Scene>) -> Result<Onlooker> {
-    let base = match (scene, args.eye, args.target) {
+    let own = match (scene, args.eye, args.target) {
         (None, ..) | (_, Some(_), Some(_)) => None,
         (Some(scene), ..) => Some(scene_camera(args, scene)?),
     };
-    let or_base = |own: Option<_>, of_base: fn(&SceneCamera) -> _, default| {
-        own.unwrap_or_else(|| base.as_ref().map_or(default, of_base))
-    };
+    let base = own.as_ref().map_or(DEFAULT_VIEW, |c| LookAt {
+        eye: c.eye,
+        target: c.target,
+        up: c.up,
+        fov_y_rad: c.fov_y_rad,
+        near: c.near,
+        far: c.far,
+        image: args.size,
+    });
     let mut look = LookAt {
-        eye: or_base(args.eye, |b| b.eye, DVec3::ZERO),
-        target: or_base(args.target, |b| b.target, DVec3::NEG_Z),
-        up: or_base(args.up, |b| b.up, DVec3::Y),
-        fov_y_rad: args
-            .fov
-            .map(f64::to_radians)
-            .unwrap_or_else(|| base.as_ref().map_or(DEFAULT_FOV_DEG.to_radians(), |b| b.fov_y_rad)),
-        near: args.near.or(base.as_ref().map(|b| b.near)).unwrap_or(0.1),
-        far: args.far.or(base.as_ref().map(|b| b.far)).unwrap_or(100.0),
+        eye: args.eye.unwrap_or(base.eye),
+        target: args.target.unwrap_or(base.target),
+        up: args.up.unwrap_or(base.up),
+        fov_y_rad: args.fov.map_or(base.fov_y_rad, f64::to_radians),
+        near: args.near.unwrap_or(base.near),
+        far: args.far.unwrap_or(base.far),
         image: args.size,
     };
     let moved = args.eye.is_some() || args.target.is_some();
@@ -114,7 +125,7 @@ pub(crate) fn onlooker(args: &ViewArgs, scene: Option<&Scene>) -> Result<Onlooke
     }
     let camera = Camera::look_at(look).map_err(|e| option_error(&e))?;
     let changed = [args.near, args.far, args.fov].iter().any(Option::is_some) || args.up.is_some();
-    let name = base.map(|b| b.name).filter(|name| {
+    let name = own.map(|c| c.name).filter(|name| {
         !moved && !changed && scene.is_some_and(|s| s.cameras.iter().any(|c| c.name == *name))
     });
     Ok(Onlooker { name, look, camera })

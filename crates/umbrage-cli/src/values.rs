@@ -4,7 +4,9 @@ use anyhow::{Result, anyhow, bail, ensure};
 use glam::DVec3;
 
 /// The longest side of a picture, pixels.
-pub(crate) const MAX_PICTURE_SIDE: u32 = 16384;
+const MAX_PICTURE_SIDE: u32 = 16384;
+/// The most pixels of a picture: 8192², with which five techniques take some 8 GB to compare.
+const MAX_PICTURE_PIXELS: u64 = 1 << 26;
 
 /// Three numbers with commas between them.
 pub(crate) fn vector(text: &str) -> Result<DVec3> {
@@ -49,9 +51,15 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64> {
 pub(crate) fn picture_size(text: &str) -> Result<[u32; 2]> {
     let side = |n: &str| n.parse().ok().filter(|n| (1..=MAX_PICTURE_SIDE).contains(n));
     let size = text.split_once('x').and_then(|(w, h)| Some([side(w)?, side(h)?]));
-    size.ok_or_else(|| {
+    let size = size.ok_or_else(|| {
         anyhow!("must be WIDTHxHEIGHT of 1 to {MAX_PICTURE_SIDE} pixels each, as in 960x540")
-    })
+    })?;
+    let pixels = u64::from(size[0]) * u64::from(size[1]);
+    ensure!(
+        pixels <= MAX_PICTURE_PIXELS,
+        "must be at most {MAX_PICTURE_PIXELS} pixels, is {pixels}"
+    );
+    Ok(size)
 }
 
 #[cfg(test)]
@@ -80,7 +88,9 @@ mod tests {
         for text in ["", "0", "180", "-60", "nan"] {
             assert!(field_of_view(text).is_err(), "{text}");
         }
-        for text in ["", "x", "100", "0x100", "100x0", "16385x1", "-1x5", "1x2x3", "1.5x2"] {
+        for text in
+            ["", "x", "100", "0x100", "100x0", "16385x1", "16384x8192", "-1x5", "1x2x3", "1.5x2"]
+        {
             assert!(picture_size(text).is_err(), "{text}");
         }
     }

@@ -122,6 +122,26 @@ fn a_scene_tightens_the_plan() {
 }
 
 #[test]
+fn parts_of_a_view_can_be_replaced() {
+    let desk = Desk::new();
+    let split = |options: &[&str]| -> [f64; 2] {
+        let plan = desk.json(&[&["plan", "town", "--json"], options].concat());
+        serde_json::from_value(plan["maps"][0]["split"].clone()).unwrap()
+    };
+    let [near, far] = split(&[]);
+    let check = |options: &[&str], expected: [f64; 2]| {
+        let [a, b] = split(options);
+        let is_close = |x: f64, y: f64| (x - y).abs() < 1e-9 * y;
+        assert!(is_close(a, expected[0]) && is_close(b, expected[1]), "{options:?}: {a} {b}");
+    };
+    check(&["--near", "1.5"], [1.5, far]);
+    check(&["--far", "20"], [near, 20.0]);
+    // Another eye sees the scene end elsewhere.
+    let [far_near, far_far] = split(&["--eye", "0,2,5000", "--target", "0,2,0"]);
+    assert!(far_far > 4500.0 && far_near > 100.0, "{far_near} {far_far}");
+}
+
+#[test]
 fn looking_away_from_everything_gives_an_empty_map() {
     let desk = Desk::new();
     desk.write("stage.gltf", STAGE_GLTF);

@@ -32,4 +32,7 @@ fn a_file_wins_over_a_built_in_scene() {
     let run = desk.run(&["plan", "sphere"]);
     assert_ne!(run.code, 0);
     assert!(run.stderr.contains("sphere"), "{}", run.stderr);
+    // A folder is no scene: the report of `compare pole -o pole` does not hide the pole.
+    std::fs::create_dir(desk.path("pole")).unwrap();
+    desk.succeed(&["plan", "pole"]);
 }
