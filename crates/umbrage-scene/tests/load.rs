@@ -1,0 +1,605 @@
+//! What glTF features become, and what broken files get: small files, made here.
+
+use glam::{DVec3, Vec2, Vec3};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use umbrage::{Light, SpotLight};
+use umbrage_scene::{Alpha, Scene, SceneError, Wrap, load};
+
+/// A file under construction: JSON, and one buffer beside it.
+struct File {
+    json: Value,
+    buffer: Vec<u8>,
+}
+
+impl File {
+    /// One triangle, (0,0,0) (1,0,0) (0,1,0) with normals +z and texture coordinates like x and y,
+    /// on one node.
+    fn triangle() -> Self {
+        let json = json!({
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{
+                "attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3
+            }]}],
+            "accessors": [],
+            "bufferViews": [],
+        });
+        let mut file = Self { json, buffer: Vec::new() };
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        file.floats("VEC3", &corners.concat());
+        file.floats("VEC3", &[[0.0, 0.0, 1.0]; 3].concat());
+        file.floats("VEC2", &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        file.u16s("SCALAR", &[0, 1, 2]);
+        file
+    }
+
+    /// Adds an accessor; returns its index.
+    fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
+        let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        self.accessor(kind, 5126, values.len(), &bytes)
+    }
+
+    fn u16s(&mut self, kind: &str, values: &[u16]) -> usize {
+        let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        self.accessor(kind, 5123, values.len(), &bytes)
+    }
+
+    fn accessor(&mut self, kind: &str, component: u32, n: usize, bytes: &[u8]) -> usize {
+        let width = match kind {
+            "SCALAR" => 1,
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 16,
+        };
+        let view = self.view(bytes);
+        self.push(
+            "accessors",
+            json!({
+                "bufferView": view, "componentType": component, "count": n / width, "type": kind
+            }),
+        )
+    }
+
+    fn view(&mut self, bytes: &[u8]) -> usize {
+        let offset = self.buffer.len();
+        self.buffer.extend(bytes);
+        self.buffer.resize(self.buffer.len().next_multiple_of(4), 0);
+        self.push(
+            "bufferViews",
+            json!({
+                "buffer": 0, "byteOffset": offset, "byteLength": bytes.len()
+            }),
+        )
+    }
+
+    fn push(&mut self, list: &str, value: Value) -> usize {
+        if self.json[list].is_null() {
+            self.json[list] = json!([]);
+        }
+        let list = self.json[list].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    }
+
+    /// Sets the value at a JSON pointer whose parent exists.
+    fn set(mut self, pointer: &str, value: Value) -> Self {
+        let (parent, key) = pointer.rsplit_once('/').unwrap();
+        let parent = self.json.pointer_mut(parent).unwrap_or_else(|| panic!("{pointer}"));
+        match parent.as_array_mut() {
+            Some(list) => list[key.parse::<usize>().unwrap()] = value,
+            None => parent[key] = value,
+        }
+        self
+    }
+
+    fn primitive(&mut self) -> &mut Value {
+        &mut self.json["meshes"][0]["primitives"][0]
+    }
+
+    fn with_buffer(mut self, uri: Option<&str>, length: usize) -> Self {
+        self.json["buffers"] = json!([{"byteLength": length}]);
+        if let Some(uri) = uri {
+            self.json["buffers"][0]["uri"] = json!(uri);
+        }
+        self
+    }
+
+    /// As `.gltf` with its buffer beside it.
+    fn write(self, folder: &Path) -> PathBuf {
+        let length = self.buffer.len();
+        std::fs::write(folder.join("a buffer.bin"), &self.buffer).unwrap();
+        let path = folder.join("scene.gltf");
+        let json = self.with_buffer(Some("a%20buffer.bin"), length).json;
+        std::fs::write(&path, serde_json::to_vec(&json).unwrap()).unwrap();
+        path
+    }
+
+    fn glb(self) -> Vec<u8> {
+        let buffer = self.buffer.clone();
+        let mut json = serde_json::to_vec(&self.with_buffer(None, buffer.len()).json).unwrap();
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut glb = b"glTF\x02\0\0\0".to_vec();
+        glb.extend((28 + json.len() as u32 + buffer.len() as u32).to_le_bytes());
+        for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &buffer)] {
+            glb.extend((chunk.len() as u32).to_le_bytes());
+            glb.extend(kind);
+            glb.extend(chunk);
+        }
+        glb
+    }
+
+    fn load(self) -> Result<Scene, SceneError> {
+        let folder = TempDir::new().unwrap();
+        load(&self.write(folder.path()))
+    }
+
+    /// The error's message after the file's name.
+    fn error(self) -> String {
+        let folder = TempDir::new().unwrap();
+        let path = self.write(folder.path());
+        let error = load(&path).expect_err("must not load").to_string();
+        let rest = error.strip_prefix(&format!("{}: ", path.display()));
+        rest.unwrap_or_else(|| panic!("{error}: does not begin with the file")).to_owned()
+    }
+}
+
+fn notices(scene: &Scene) -> Vec<&str> {
+    scene.notices.iter().map(|n| n.0.as_str()).collect()
+}
+
+#[test]
+fn a_triangle_arrives_as_it_was_written_from_gltf_and_glb() {
+    let folder = TempDir::new().unwrap();
+    let glb = folder.path().join("triangle.glb");
+    std::fs::write(&glb, File::triangle().glb()).unwrap();
+    for scene in [File::triangle().load().unwrap(), load(&glb).unwrap()] {
+        assert_eq!(notices(&scene), [""; 0]);
+        let mesh = &scene.meshes[0];
+        assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert_eq!(mesh.normals, [Vec3::Z; 3]);
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        assert_eq!(mesh.uvs, [Vec2::ZERO; 0], "no texture, no coordinates");
+        assert_eq!(scene.materials.len(), 1);
+        assert_eq!(scene.materials[0].base_color, glam::Vec4::ONE);
+    }
+    assert_eq!(load(&glb).unwrap().name, "triangle");
+}
+
+#[test]
+fn data_uris_hold_buffers() {
+    use base64::Engine;
+    let file = File::triangle();
+    let encoded = base64::engine::general_purpose::STANDARD.encode(&file.buffer);
+    let (length, uri) =
+        (file.buffer.len(), format!("data:application/gltf-buffer;base64,{encoded}"));
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("scene.gltf");
+    let json = file.with_buffer(Some(&uri), length).json;
+    std::fs::write(&path, serde_json::to_vec(&json).unwrap()).unwrap();
+    assert_eq!(load(&path).unwrap().drawn_triangles(), 1);
+}
+
+#[test]
+fn nodes_nest_and_share_meshes() {
+    let file = File::triangle().set("/scenes/0/nodes", json!([0, 1])).set("/nodes", json!([
+        {"translation": [10, 0, 0], "rotation": [0, 0.70710678, 0, 0.70710678], "scale": [2, 2, 2],
+         "children": [2]},
+        {"mesh": 0, "matrix": [-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,5,1]},
+        {"mesh": 0, "translation": [1, 0, 0]},
+        {"mesh": 0, "name": "in no scene"},
+    ]));
+    let scene = file.load().unwrap();
+    assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 2));
+    let corner = |i: usize| scene.instances[i].world_from_mesh.transform_point3(DVec3::X);
+    // x turns to −z, is doubled, then moved.
+    assert!((corner(0) - DVec3::new(10.0, 0.0, -4.0)).length() < 1e-6, "{}", corner(0));
+    assert_eq!(corner(1), DVec3::new(-1.0, 0.0, 5.0), "mirrored");
+}
+
+#[test]
+fn instancing_extension_draws_copies() {
+    let mut file = File::triangle();
+    let at = file.floats("VEC3", &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
+    let scale = file.floats("VEC3", &[1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+    file.json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing": {
+        "attributes": {"TRANSLATION": at, "SCALE": scale}
+    }});
+    file.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+    let scene = file.load().unwrap();
+    assert_eq!(scene.instances.len(), 2);
+    let far = scene.instances[1].world_from_mesh.transform_point3(DVec3::X);
+    assert_eq!(far, DVec3::new(7.0, 0.0, 0.0));
+}
+
+#[test]
+fn strips_and_fans_become_triangles_and_lines_are_left_out() {
+    let mut file = File::triangle();
+    let positions = file.floats(
+        "VEC3",
+        &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]].concat(),
+    );
+    let primitive = |mode: u32| json!({"attributes": {"POSITION": positions}, "mode": mode});
+    file.json["meshes"][0]["primitives"] = json!([primitive(5), primitive(6), primitive(1)]);
+    let scene = file.load().unwrap();
+    assert_eq!(scene.meshes.len(), 2);
+    // The strip's triangles face the same way; flat normals show it.
+    assert_eq!(scene.meshes[0].triangles.len(), 2);
+    assert_eq!(scene.meshes[0].normals, [Vec3::Z; 6]);
+    assert_eq!(scene.meshes[1].triangles.len(), 2);
+    assert_eq!(
+        notices(&scene),
+        [
+            "meshes[0].primitives[0] and 1 more: has no normals, shaded flat",
+            "meshes[0].primitives[2]: points and lines are left out",
+        ]
+    );
+}
+
+#[test]
+fn normals_without_direction_come_from_the_triangles_around() {
+    let mut file = File::triangle();
+    let normals = file.floats("VEC3", &[0.0, 0.0, 0.0, 0.0, 3.0, 4.0, f32::NAN, 0.0, 1.0]);
+    file.primitive()["attributes"]["NORMAL"] = json!(normals);
+    let scene = file.load().unwrap();
+    assert_eq!(scene.meshes[0].normals, [Vec3::Z, Vec3::new(0.0, 0.6, 0.8), Vec3::Z]);
+    assert_eq!(
+        notices(&scene),
+        [
+            "meshes[0].primitives[0]: 2 normals without a direction, computed from the triangles around",
+        ]
+    );
+}
+
+fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
+    let height = pixels.len() as u32 / width;
+    let image = image::RgbaImage::from_raw(width, height, pixels.concat()).unwrap();
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// The triangle with a texture of a clear left half and a red right half.
+fn masked() -> File {
+    let mut file = File::triangle();
+    let view = file.view(&png(&[[255, 0, 0, 0], [255, 0, 0, 255]], 2));
+    file.push("images", json!({"bufferView": view, "mimeType": "image/png"}));
+    file.push("samplers", json!({"wrapS": 33071, "wrapT": 33648}));
+    file.push("textures", json!({"source": 0, "sampler": 0}));
+    file.push(
+        "materials",
+        json!({
+            "name": "leaf", "alphaMode": "MASK", "alphaCutoff": 0.4, "doubleSided": true,
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.5, 1, 1, 1], "baseColorTexture": {"index": 0}
+            }
+        }),
+    );
+    file.primitive()["material"] = json!(0);
+    file
+}
+
+#[test]
+fn masks_keep_cutoff_texture_and_addressing() {
+    let scene = masked().load().unwrap();
+    let material = &scene.materials[scene.meshes[0].material];
+    assert_eq!((material.name.as_str(), material.double_sided), ("leaf", true));
+    assert_eq!(material.alpha, Alpha::Mask { cutoff: 0.4 });
+    assert_eq!(material.base_color.x, 0.5);
+    let texture = &scene.textures[material.base_color_texture.unwrap().0];
+    assert_eq!(texture.wrap, [Wrap::Clamp, Wrap::Mirror]);
+    assert_eq!(texture.sample_alpha(Vec2::new(0.1, 0.5)), 0.0);
+    assert_eq!(texture.sample_alpha(Vec2::new(0.9, 0.5)), 1.0);
+    assert_eq!(scene.meshes[0].uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
+}
+
+#[test]
+fn translucent_materials_are_cut_at_one_half_and_say_so() {
+    let scene = masked().set("/materials/0/alphaMode", json!("BLEND")).load().unwrap();
+    assert_eq!(scene.materials[0].alpha, Alpha::Mask { cutoff: 0.5 });
+    assert!(notices(&scene)[0].contains("translucent"), "{:?}", notices(&scene));
+}
+
+#[test]
+fn texture_transforms_and_other_coordinate_sets_apply() {
+    let mut file = masked();
+    let other = file.floats("VEC2", &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    file.primitive()["attributes"] = json!({"POSITION": 0, "NORMAL": 1, "TEXCOORD_3": other});
+    let info = &mut file.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+    info["extensions"] = json!({"KHR_texture_transform": {
+        "texCoord": 3, "offset": [0.5, 0.25], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2, 3]
+    }});
+    let uvs = &file.load().unwrap().meshes[0].uvs;
+    // A quarter turn counter-clockwise, v down, takes u to −v and v to u.
+    let expected = [Vec2::new(0.5, 0.25), Vec2::new(0.5, -1.75), Vec2::new(3.5, 0.25)];
+    for (uv, expected) in uvs.iter().zip(expected) {
+        assert!(uv.distance(expected) < 1e-5, "{uvs:?}");
+    }
+}
+
+#[test]
+fn missing_and_broken_images_leave_materials_plain() {
+    for image in [
+        json!({"uri": "no%20such.png"}),
+        json!({"uri": "a%20buffer.bin"}),
+        json!({"bufferView": 99, "mimeType": "image/png"}),
+        json!({"uri": "../outside.png"}),
+        json!({}),
+    ] {
+        let scene = masked().set("/images/0", image.clone()).load().unwrap();
+        assert_eq!(scene.materials[0].base_color_texture, None, "{image}");
+        assert!(notices(&scene)[0].starts_with("images[0]: left out"), "{:?}", notices(&scene));
+    }
+}
+
+#[test]
+fn cameras_look_along_minus_z() {
+    let mut file = File::triangle().set("/nodes/0", json!({"mesh": 0, "children": [1, 2]}));
+    file.push(
+        "nodes",
+        json!({
+            "camera": 0, "name": "eye", "translation": [0, 3, 0],
+            "rotation": [0, 0.70710678, 0, 0.70710678], "scale": [2, 2, 2]
+        }),
+    );
+    file.push("nodes", json!({"camera": 1}));
+    file.push(
+        "cameras",
+        json!({"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}),
+    );
+    file.push(
+        "cameras",
+        json!({"type": "orthographic",
+        "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}}),
+    );
+    let scene = file.load().unwrap();
+    let [camera] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
+    assert_eq!(camera.name, "eye");
+    assert!((camera.eye - DVec3::Y * 3.0).length() < 1e-9);
+    let forward = (camera.target - camera.eye).normalize();
+    assert!((forward - DVec3::NEG_X).length() < 1e-6, "{forward}");
+    assert!((camera.up - DVec3::Y).length() < 1e-6);
+    assert!((camera.fov_y_rad - 0.8).abs() < 1e-6);
+    // Endless in the file; the scene lies behind.
+    assert!(camera.near < camera.far && camera.far.is_finite());
+    assert_eq!(scene.default_view(), *camera);
+    assert!(notices(&scene)[0].contains("not a perspective camera"), "{:?}", notices(&scene));
+}
+
+#[test]
+fn lights_have_their_poses_and_sensible_ranges() {
+    let mut file = File::triangle().set("/scenes/0/nodes", json!([0, 1, 2, 3]));
+    for light in 0..3 {
+        // Turned to look down.
+        file.push(
+            "nodes",
+            json!({
+                "extensions": {"KHR_lights_punctual": {"light": light}},
+                "translation": [0, 10, 0], "rotation": [-0.70710678, 0, 0, 0.70710678]
+            }),
+        );
+    }
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "intensity": 5},
+        {"type": "spot", "name": "lamp", "color": [1, 0.5, 0], "intensity": 7,
+         "spot": {"outerConeAngle": 1.55}},
+        {"type": "directional", "color": [0.5, 0.25, 0.25], "intensity": 2},
+    ]}});
+    let scene = file.load().unwrap();
+    let [point, spot, sun] = &scene.lights[..] else { panic!("{:?}", scene.lights) };
+    assert_eq!((point.name.as_str(), point.light), ("light0", None));
+    let Some(Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })) =
+        spot.light
+    else {
+        panic!("{spot:?}")
+    };
+    assert_eq!((spot.name.as_str(), spot.color), ("lamp", Vec3::new(1.0, 0.5, 0.0)));
+    assert_eq!(position, DVec3::Y * 10.0);
+    assert!((direction - DVec3::NEG_Y).length() < 1e-6, "{direction}");
+    assert!((half_angle_rad - 85f64.to_radians()).abs() < 1e-9, "as wide as may be");
+    assert!(range > 10.0 && range < 11.0, "to the farthest of the scene: {range}");
+    assert!(near > 0.0 && near < 0.1);
+    let Some(Light::Directional { direction }) = sun.light else { panic!("{sun:?}") };
+    assert!((direction - DVec3::NEG_Y).length() < 1e-6);
+    assert_eq!((sun.color, sun.intensity), (Vec3::new(1.0, 0.5, 0.5), 1.0));
+    assert_eq!(scene.default_light().name, "lamp", "the first that has a direction");
+    assert!(notices(&scene)[0].contains("outerConeAngle"), "{:?}", notices(&scene));
+}
+
+#[test]
+fn skins_stand_in_the_pose_of_their_joints() {
+    let mut file = File::triangle();
+    let joints = file.u16s("VEC4", &[0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0]);
+    let weights =
+        file.floats("VEC4", &[1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    let identity = glam::Mat4::IDENTITY.to_cols_array();
+    let lowered = glam::Mat4::from_translation(-Vec3::Y).to_cols_array();
+    let binds = file.floats("MAT4", &[identity, lowered].concat());
+    file.primitive()["attributes"]["JOINTS_0"] = json!(joints);
+    file.primitive()["attributes"]["WEIGHTS_0"] = json!(weights);
+    file.push("skins", json!({"joints": [1, 2], "inverseBindMatrices": binds}));
+    file.json["scenes"][0]["nodes"] = json!([0, 1]);
+    // The skinned node's own transform counts for nothing.
+    file.json["nodes"] = json!([
+        {"mesh": 0, "skin": 0, "translation": [100, 0, 0]},
+        {"translation": [1000000, 0, 0], "children": [2]},
+        {"translation": [0, 1, 0], "rotation": [0, 0, 0.70710678, 0.70710678]},
+    ]);
+    let scene = file.load().unwrap();
+    let (mesh, instance) = (&scene.meshes[0], scene.instances[0]);
+    let world = |i: usize| instance.world_from_mesh.transform_point3(mesh.positions[i].as_dvec3());
+    let far = DVec3::X * 1e6;
+    assert!((world(0) - far).length() < 1e-6, "{}", world(0));
+    // Joint 1 turns x to y about (0, 1, 0): (1,0,0) goes to (1,2,0); half of it and half at rest.
+    assert!((world(1) - far - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-6, "{}", world(1) - far);
+    // Its own point (0, 1, 0) stays, although the file's is a million metres from the origin.
+    assert!((world(2) - far - DVec3::Y).length() < 1e-6, "{}", world(2) - far);
+    assert!(mesh.normals.iter().all(|n| n.distance(Vec3::Z) < 1e-6));
+}
+
+#[test]
+fn flat_nodes_are_left_out_and_empty_scenes_refused() {
+    let file = || File::triangle().set("/scenes/0/nodes", json!([0, 1]));
+    let flat = json!({"mesh": 0, "scale": [1, 0, 1]});
+    let mut one = file();
+    one.push("nodes", flat.clone());
+    let scene = one.load().unwrap();
+    assert_eq!(scene.instances.len(), 1);
+    assert_eq!(notices(&scene), ["nodes[1]: its transform flattens its mesh, left out"]);
+    let mut both = file().set("/nodes/0", flat.clone());
+    both.push("nodes", flat);
+    assert_eq!(both.error(), "scene: there are no triangles to draw");
+}
+
+#[test]
+fn broken_files_say_what_is_wrong_and_where() {
+    let with_nan = |bad: f32| {
+        let mut file = File::triangle();
+        let positions = file.floats("VEC3", &[0.0, 0.0, 0.0, bad, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        file.primitive()["attributes"]["POSITION"] = json!(positions);
+        file
+    };
+    let mut index = File::triangle();
+    let indices = index.u16s("SCALAR", &[0, 1, 3]);
+    index.primitive()["indices"] = json!(indices);
+    let t = File::triangle;
+    let cases: Vec<(File, &str)> = vec![
+        (with_nan(f32::NAN), "position 1 is [NaN, 0, 0], must be finite"),
+        (with_nan(f32::INFINITY), "must be finite"),
+        (index, "index 2 is 3, there are 3 positions"),
+        (t().set("/nodes/0/mesh", json!(7)), "nodes[0]: index 7 points nowhere"),
+        (t().set("/scene", json!(3)), "scene: index 3 points nowhere"),
+        (t().set("/scenes/0/nodes", json!([9])), "scenes: there is no nodes[9]"),
+        (
+            t().set("/meshes/0/primitives/0/attributes/POSITION", json!(99)),
+            "index 99 points nowhere",
+        ),
+        (
+            t().set("/meshes/0/primitives/0/attributes/POSITION", json!(2)),
+            "is Vec2, should be Vec3",
+        ),
+        (t().set("/meshes/0/primitives/0/indices", json!(0)), "must be unsigned integers"),
+        (t().set("/meshes/0/primitives/0/material", json!(5)), "index 5 points nowhere"),
+        (t().set("/meshes/0/primitives/0/mode", json!(77)), "mode is unknown"),
+        (t().set("/accessors/0/count", json!(4)), "4 elements from byte 0 on do not fit"),
+        (t().set("/accessors/0/count", json!(u64::MAX)), "do not fit"),
+        (t().set("/accessors/0/byteOffset", json!(u64::MAX)), "do not fit"),
+        (t().set("/accessors/0/componentType", json!(1)), "componentType is unknown"),
+        (t().set("/accessors/1/count", json!(2)), "has 3 positions but 2 normals"),
+        (
+            t().set("/accessors/0", json!({"count": 3, "componentType": 5126, "type": "VEC3"})),
+            "has no bufferView",
+        ),
+        (
+            t().set("/bufferViews/0/byteLength", json!(1u64 << 40)),
+            "bufferViews[0]: 1099511627776 bytes",
+        ),
+        (t().set("/bufferViews/0/byteOffset", json!(u64::MAX)), "do not fit into the buffer's"),
+        (t().set("/bufferViews/0/buffer", json!(8)), "there is no buffers[8]"),
+        (t().set("/bufferViews/0/byteStride", json!(4)), "byteStride 4 is less than"),
+        (t().set("/nodes/0/children", json!([0])), "among their own ancestors"),
+        (
+            t().set("/nodes", json!([{"children": [1]}, {"children": [0]}])),
+            "among their own ancestors",
+        ),
+        (t().set("/nodes", json!([{"children": [1, 1]}, {}])), "already is a child of"),
+        (t().set("/nodes/0/children", json!([4])), "there is no nodes[4]"),
+        (t().set("/nodes/0/rotation", json!([0, 0, 0, 0])), "nodes[0].rotation: is no rotation"),
+        (t().set("/nodes/0/scale", json!([1e39, 1, 1])), "nodes[0].scale: is not finite"),
+        (t().set("/nodes/0/matrix", json!(vec![0; 16])), "is not affine"),
+        (t().set("/nodes/0/scale", json!([1e13, 1, 1])), "the world ends at 1e12 m"),
+        (t().set("/asset/version", json!("1.0")), "asset.version: is \"1.0\""),
+        (
+            t().set("/extensionsRequired", json!(["KHR_draco_mesh_compression"])),
+            "KHR_draco_mesh_compression is not supported",
+        ),
+        (t().set("/meshes", json!("none")), "JSON: is not glTF 2.0"),
+    ];
+    for (file, expected) in cases {
+        let json = file.json.to_string();
+        let error = file.error();
+        assert!(error.contains(expected), "{error:?} should contain {expected:?}; {json}");
+    }
+}
+
+#[test]
+fn sparse_accessors_are_filled_in_or_refused() {
+    let sparse = |at: u16, count: u64| {
+        let mut file = File::triangle();
+        let indices = file.view(&at.to_le_bytes());
+        let values = file.view(&[0u8, 0, 0x40, 0x40].repeat(3));
+        file.json["accessors"][0] = json!({
+            "componentType": 5126, "type": "VEC3", "count": count,
+            "sparse": {"count": 1,
+                "indices": {"bufferView": indices, "componentType": 5123},
+                "values": {"bufferView": values}}
+        });
+        file
+    };
+    assert_eq!(
+        sparse(1, 3).load().unwrap().meshes[0].positions,
+        [Vec3::ZERO, Vec3::splat(3.0), Vec3::ZERO]
+    );
+    assert!(sparse(3, 3).error().contains("sparse index 3 is out of range"));
+    assert!(sparse(1, 1 << 40).error().contains("too many"));
+}
+
+#[test]
+fn buffers_are_read_from_below_the_scenes_folder_only() {
+    let folder = TempDir::new().unwrap();
+    let below = folder.path().join("below");
+    std::fs::create_dir(&below).unwrap();
+    let file = File::triangle();
+    let length = file.buffer.len();
+    std::fs::write(folder.path().join("outside.bin"), &file.buffer).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(folder.path().join("outside.bin"), below.join("link.bin")).unwrap();
+    let outside = folder.path().join("outside.bin");
+    let absolute = outside.to_str().unwrap();
+    for uri in ["../outside.bin", "%2E%2E/outside.bin", "link.bin", absolute, "gone.bin", "."] {
+        let path = below.join("scene.gltf");
+        let json = File::triangle().with_buffer(Some(uri), length).json;
+        std::fs::write(&path, serde_json::to_vec(&json).unwrap()).unwrap();
+        let error = load(&path).expect_err(uri).to_string();
+        assert!(error.contains(&below.display().to_string()), "{error}");
+    }
+}
+
+#[test]
+fn files_that_are_none_get_an_error() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("x.glb");
+    let good = File::triangle().glb();
+    let long = {
+        let mut long = good.clone();
+        long[8..12].copy_from_slice(&u32::MAX.to_le_bytes());
+        long
+    };
+    let short_buffer = {
+        let file = File::triangle();
+        let json = file.with_buffer(None, 1 << 20).json;
+        serde_json::to_vec(&json).unwrap()
+    };
+    for bytes in [
+        &b""[..],
+        b"glTF",
+        b"glTF\x02\0\0\0\0\0\0\0",
+        b"{}",
+        b"[1, 2",
+        &good[..50],
+        &long,
+        &short_buffer,
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        assert!(matches!(load(&path), Err(SceneError::Invalid { .. })), "{bytes:?}");
+    }
+    for path in [folder.path(), &folder.path().join("none.glb"), Path::new("")] {
+        assert!(matches!(load(path), Err(SceneError::Read { .. })), "{}", path.display());
+    }
+    std::fs::write(&path, &good).unwrap();
+    assert!(load(&path).is_ok());
+}

@@ -1,0 +1,150 @@
+//! Views and suns chosen for scenes that bring none.
+
+use glam::{DAffine3, DVec3};
+use std::path::PathBuf;
+use umbrage::{Camera, Light, LookAt};
+use umbrage_scene::{Scene, SceneCamera, builtin, load};
+
+fn real(file: &str) -> Scene {
+    let folder = match std::env::var_os("UMBRAGE_SCENES") {
+        Some(folder) => folder.into(),
+        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
+    };
+    let path = folder.join(file);
+    assert!(path.exists(), "{}: missing; set UMBRAGE_SCENES to its folder", path.display());
+    load(&path).unwrap()
+}
+
+fn camera(view: &SceneCamera) -> Camera {
+    Camera::look_at(LookAt {
+        eye: view.eye,
+        target: view.target,
+        up: view.up,
+        fov_y_rad: view.fov_y_rad,
+        near: view.near,
+        far: view.far,
+        image: [1280, 720],
+    })
+    .unwrap()
+}
+
+fn sun_elevation_deg(scene: &Scene) -> f64 {
+    let Some(Light::Directional { direction }) = scene.default_light().light else {
+        panic!("not a sun")
+    };
+    (-direction.normalize().y).asin().to_degrees()
+}
+
+#[test]
+fn objects_are_seen_whole_from_outside() {
+    for file in ["dragon/dragon_res4.glb", "vehicles/airplane_pyvista.glb", "characters/Fox.glb"] {
+        let scene = real(file);
+        let (view, bounds) = (scene.default_view(), scene.bounds());
+        let camera = camera(&view);
+        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for i in &scene.instances {
+            for p in &scene.meshes[i.mesh].positions {
+                let p = i.world_from_mesh.transform_point3(p.as_dvec3());
+                let depth = camera.depth(p);
+                assert!(view.near < depth && depth < view.far, "{file}: {depth} {view:?}");
+                let pixel = camera.pixel(p).unwrap();
+                lo = [lo[0].min(pixel.x), lo[1].min(pixel.y)];
+                hi = [hi[0].max(pixel.x), hi[1].max(pixel.y)];
+            }
+        }
+        assert!(
+            lo[0] > 0.0 && lo[1] > 0.0 && hi[0] < 1280.0 && hi[1] < 720.0,
+            "{file}: {lo:?} {hi:?}"
+        );
+        // And not as a speck.
+        assert!(hi[0] - lo[0] > 800.0 || hi[1] - lo[1] > 450.0, "{file}: {lo:?} {hi:?}");
+        assert!(view.eye.y > bounds.min.y, "{file}: from below");
+        assert!((sun_elevation_deg(&scene) - 45.0).abs() < 1e-6, "{file}");
+    }
+}
+
+#[test]
+fn rooms_are_seen_from_inside() {
+    for file in ["lattice/barn_skylight.glb", "atrium/sponza_atrium_reduced.glb"] {
+        let scene = real(file);
+        let (eye, b) = (scene.default_view().eye, scene.bounds());
+        assert!(eye.cmpgt(b.min).all() && eye.cmplt(b.max).all(), "{file}: {eye} {b:?}");
+    }
+}
+
+#[test]
+fn worlds_are_stood_in_near_their_ground() {
+    for file in [
+        "vehicles/kenney_racing_level.glb",
+        "dragon/dragons25_res3.glb",
+        "trees/forest_eztree.glb",
+        "city/delft_city.glb",
+        "city/kenney_city_40x40.glb",
+        "terrain/jacksboro_dem_terrain.glb",
+    ] {
+        let scene = real(file);
+        let (view, b) = (scene.default_view(), scene.bounds());
+        let inside = view.eye.cmpgt(b.min) & view.eye.cmplt(b.max);
+        assert!(inside.x && inside.z, "{file}: {view:?} {b:?}");
+        assert!(view.eye.y < b.min.y + 1.3 * b.size().y, "{file}: {view:?}");
+        assert!(view.far / view.near <= 1000.0 + 1e-6, "{file}: {view:?}");
+        camera(&view);
+    }
+}
+
+#[test]
+fn gentle_land_gets_a_low_sun_and_a_scene_its_own_light() {
+    assert!(sun_elevation_deg(&real("terrain/jacksboro_dem_terrain.glb")) < 26.0);
+    let barn = real("lattice/barn_skylight.glb");
+    assert_eq!(barn.default_light(), barn.lights[0]);
+}
+
+/// A built-in world without its camera and sun, moved.
+fn moved(world_from_scene: DAffine3) -> Scene {
+    let mut scene = builtin("statues", Some(3)).unwrap();
+    scene.cameras.clear();
+    scene.lights.clear();
+    for i in &mut scene.instances {
+        i.world_from_mesh = world_from_scene * i.world_from_mesh;
+    }
+    scene
+}
+
+#[test]
+fn views_scale_and_move_with_their_scene() {
+    let reference = moved(DAffine3::IDENTITY).default_view();
+    for (scale, offset) in [(1e-3, 0.0), (1.0, 1e5), (1e4, -3e6)] {
+        let to = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(scale),
+            glam::DQuat::IDENTITY,
+            DVec3::splat(offset),
+        );
+        let view = moved(to).default_view();
+        let expected = to.transform_point3(reference.eye);
+        assert!((view.eye - expected).length() < 0.2 * scale, "{scale}, {offset}: {view:?}");
+        assert!((view.far / scale - reference.far).abs() < 0.2, "{scale}, {offset}: {view:?}");
+    }
+}
+
+#[test]
+fn scenes_of_nothing_or_of_a_point_get_a_valid_view_and_sun() {
+    let mut empty = Scene::default();
+    let mut point = moved(DAffine3::IDENTITY);
+    for mesh in &mut point.meshes {
+        mesh.positions.fill(glam::Vec3::ONE);
+    }
+    point.instances.truncate(1);
+    let flat = {
+        let mut scene = builtin("slit", None).unwrap();
+        scene.instances.truncate(1);
+        scene.cameras.clear();
+        scene.lights.clear();
+        scene
+    };
+    empty.name = "empty".into();
+    for scene in [empty, point, flat] {
+        camera(&scene.default_view());
+        let light = scene.default_light().light.unwrap();
+        assert!(light.direction_to_light(DVec3::ZERO).y > 0.0, "{}: {light:?}", scene.name);
+    }
+}
