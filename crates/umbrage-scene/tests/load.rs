@@ -7,6 +7,9 @@ use tempfile::TempDir;
 use umbrage::{Light, SpotLight};
 use umbrage_scene::{Alpha, Scene, SceneError, Wrap, load};
 
+/// Sine and cosine of 45°, of quaternions that make a quarter turn.
+const QUARTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// A file under construction: JSON, and one buffer beside it.
 struct File {
     json: Value,
@@ -186,13 +189,16 @@ fn data_uris_hold_buffers() {
 
 #[test]
 fn nodes_nest_and_share_meshes() {
-    let file = File::triangle().set("/scenes/0/nodes", json!([0, 1])).set("/nodes", json!([
-        {"translation": [10, 0, 0], "rotation": [0, 0.70710678, 0, 0.70710678], "scale": [2, 2, 2],
-         "children": [2]},
-        {"mesh": 0, "matrix": [-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,5,1]},
-        {"mesh": 0, "translation": [1, 0, 0]},
-        {"mesh": 0, "name": "in no scene"},
-    ]));
+    let file = File::triangle().set("/scenes/0/nodes", json!([0, 1])).set(
+        "/nodes",
+        json!([
+            {"translation": [10, 0, 0], "rotation": [0, QUARTER, 0, QUARTER], "scale": [2, 2, 2],
+             "children": [2]},
+            {"mesh": 0, "matrix": [-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,5,1]},
+            {"mesh": 0, "translation": [1, 0, 0]},
+            {"mesh": 0, "name": "in no scene"},
+        ]),
+    );
     let scene = file.load().unwrap();
     assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 2));
     let corner = |i: usize| scene.instances[i].world_from_mesh.transform_point3(DVec3::X);
@@ -343,7 +349,7 @@ fn cameras_look_along_minus_z() {
         "nodes",
         json!({
             "camera": 0, "name": "eye", "translation": [0, 3, 0],
-            "rotation": [0, 0.70710678, 0, 0.70710678], "scale": [2, 2, 2]
+            "rotation": [0, QUARTER, 0, QUARTER], "scale": [2, 2, 2]
         }),
     );
     file.push("nodes", json!({"camera": 1}));
@@ -379,7 +385,7 @@ fn lights_have_their_poses_and_sensible_ranges() {
             "nodes",
             json!({
                 "extensions": {"KHR_lights_punctual": {"light": light}},
-                "translation": [0, 10, 0], "rotation": [-0.70710678, 0, 0, 0.70710678]
+                "translation": [0, 10, 0], "rotation": [-QUARTER, 0, 0, QUARTER]
             }),
         );
     }
@@ -427,7 +433,7 @@ fn skins_stand_in_the_pose_of_their_joints() {
     file.json["nodes"] = json!([
         {"mesh": 0, "skin": 0, "translation": [100, 0, 0]},
         {"translation": [1000000, 0, 0], "children": [2]},
-        {"translation": [0, 1, 0], "rotation": [0, 0, 0.70710678, 0.70710678]},
+        {"translation": [0, 1, 0], "rotation": [0, 0, QUARTER, QUARTER]},
     ]);
     let scene = file.load().unwrap();
     let (mesh, instance) = (&scene.meshes[0], scene.instances[0]);

@@ -46,7 +46,7 @@ impl Document<'_> {
         if !matches!(component.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
             return Err(self.invalid(place, "must be unsigned integers"));
         }
-        self.read(id, place, |component, bytes| unsigned(component, bytes))
+        self.read(id, place, unsigned)
     }
 
     fn read<T: Copy + Default, const N: usize>(

@@ -1,6 +1,10 @@
 use super::document::Document;
 use crate::error::SceneError;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
+use gltf::json::Index;
+
+/// Entries of transforms beyond this count as overflow, long before products with positions do.
+const LARGEST: f64 = 1e100;
 
 /// Where every node of a file stands.
 pub(super) struct Hierarchy {
@@ -15,7 +19,7 @@ impl Hierarchy {
     /// Nodes with two parents or among their own ancestors, and transforms that are none.
     pub(super) fn of(document: &Document) -> Result<Self, SceneError> {
         let nodes = &document.root.nodes;
-        let children = |i: usize| nodes[i].children.iter().flatten().map(|c| c.value());
+        let children = |i: usize| nodes[i].children.iter().flatten().map(Index::value);
         let mut parent = vec![None; nodes.len()];
         for i in 0..nodes.len() {
             for child in children(i) {
@@ -37,7 +41,7 @@ impl Hierarchy {
             reached += 1;
             let above = parent[i].map_or(DAffine3::IDENTITY, |p| world_from_node[p]);
             let world = above * local(document, i)?;
-            if !world.is_finite() {
+            if world.to_cols_array().iter().any(|c| !c.is_finite() || c.abs() > LARGEST) {
                 return Err(document.invalid(&format!("nodes[{i}]"), "its transform overflows"));
             }
             world_from_node[i] = world;
@@ -53,7 +57,7 @@ impl Hierarchy {
         };
         let mut open: Vec<usize> = match scene {
             None => roots().collect(),
-            Some(scene) => scene.nodes.iter().map(|n| n.value()).collect(),
+            Some(scene) => scene.nodes.iter().map(Index::value).collect(),
         };
         open.reverse();
         let mut seen = vec![false; nodes.len()];

@@ -217,7 +217,7 @@ impl Loader<'_> {
             return Err(self.document.invalid("scene", "there are no triangles to draw"));
         }
         let reach = bounds.min.abs().max(bounds.max.abs()).max_element();
-        if !(reach <= WORLD_END) {
+        if reach > WORLD_END {
             let problem = format!("reaches {reach:e} m from the origin, the world ends at 1e12 m");
             return Err(self.document.invalid("scene", problem));
         }
@@ -269,5 +269,5 @@ fn name_if_empty(name: &mut String, kind: &str, index: usize) {
 /// Whether a transform has no inverse worth the name.
 fn is_flat(m: DMat3) -> bool {
     let lengths = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-    !(m.determinant().abs() > 1e-9 * lengths) || !m.inverse().is_finite()
+    m.determinant().abs() <= 1e-9 * lengths || !m.inverse().is_finite()
 }

@@ -107,8 +107,7 @@ pub(super) fn load_light(
             Some(Light::Spot(SpotLight {
                 position,
                 direction,
-                // NaN, too, becomes the narrowest.
-                half_angle_rad: outer.max(1e-3).min(MAX_HALF_ANGLE_RAD),
+                half_angle_rad: outer.clamp(1e-3, MAX_HALF_ANGLE_RAD),
                 near: range * SPOT_NEAR_SHARE,
                 range,
             }))

@@ -222,7 +222,7 @@ impl Occupancy {
         let (a, b) = (-origin * inverse, (end - origin) * inverse);
         let enter = a.min(b).max_element().max(0.0);
         let leave = a.max(b).min_element();
-        if !(enter < leave) {
+        if enter.is_nan() || leave.is_nan() || enter >= leave {
             return None;
         }
         let start = origin + direction * (enter + (leave - enter) * 1e-9);
