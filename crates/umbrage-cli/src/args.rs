@@ -56,8 +56,8 @@ pub(crate) struct Render {
     /// Picture to write: .png, or .exr for raw floats.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
-    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    /// How to make shadows, as in lispsm:pcf3@2048.
+    #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: Technique,
     /// What to write.
     #[arg(long, value_enum, default_value_t = Aov::Color)]
@@ -66,11 +66,11 @@ pub(crate) struct Render {
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
     #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+    #[command(flatten)]
     pub(crate) view: ViewArgs,
     #[command(flatten)]
     pub(crate) light: LightArgs,
-    #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
 }
 
 /// What a rendered picture shows.
@@ -109,8 +109,8 @@ pub(crate) struct Compare {
     /// Folder for the report; a former report there is replaced.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048. Once for each technique.
-    #[arg(
+    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
+    #[arg(long_help = SHADOWS_HELP,
         long, value_name = "SPEC",
         default_values = DEFAULT_TECHNIQUES
     )]
@@ -120,14 +120,14 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
     #[command(flatten)]
-    pub(crate) view: ViewArgs,
-    #[command(flatten)]
-    pub(crate) light: LightArgs,
-    #[command(flatten)]
     pub(crate) execution: ExecutionArgs,
     /// Print report.json to standard output.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
 }
 
 /// `umbrage plan`.
@@ -142,16 +142,16 @@ pub(crate) struct Plan {
     /// view between --near and --far is served.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: Option<String>,
-    /// How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
-    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    /// How to make shadows, as in lispsm:pcf3@2048.
+    #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: Technique,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) view: ViewArgs,
     #[command(flatten)]
     pub(crate) light: LightArgs,
-    /// Print JSON instead of a table.
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 /// `umbrage scenes`.
@@ -247,6 +247,15 @@ pub(crate) enum Backend {
 
 /// What `compare` compares if not told.
 pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "tsm", "adaptive"];
+
+/// The shadow specification language, as far as this version can execute it.
+const SHADOWS_HELP: &str = "\
+How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
+WARP:   unfocused, uniform, psm, lispsm, tsm, tsm(focus=METRES),
+        adaptive, adaptive(area), log, lambda=METRES.
+FILTER: hard (default), or pcfN for the mean over N×N texels.
+TEXELS: a budget of TEXELS² texels, shared between s and t as the view
+        needs it (default 1024), or WxH for exactly these.";
 
 /// What is done if no command is given.
 const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];

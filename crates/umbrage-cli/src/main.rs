@@ -1,6 +1,6 @@
 //! The program `umbrage`: how wrong is which shadow mapping technique, where, and at what price.
 //!
-//! Two layers: [`args`] parses and checks, all else constructs and runs.
+//! Two layers: `args` parses and checks, all else constructs and runs.
 
 mod args;
 mod compare;
