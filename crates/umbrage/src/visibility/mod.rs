@@ -1,4 +1,25 @@
 //! The shadow test and its filters, as pure functions over whatever holds the depths.
+//!
+//! # Bias
+//!
+//! None is set by hand. Perspective maps take planes to planes, so the depth of the receiver's plane
+//! at a texel's centre is known exactly ([`Receiver::slope`]). A texel hides the receiver if its
+//! depth is less than
+//!
+//! > min(depth of the receiver's plane at the texel's centre, the receiver's own depth) − σ − 2⁻²⁵
+//!
+//! - The plane alone is exact for planes, but calls a receiver hidden by what lies deeper than
+//!   itself, where the surface bends away within a texel; hence the minimum.
+//! - σ is the spread of the plane's depth over a texel, its standard deviation: |∇|/√12 for a slope of
+//!   ∇ a texel, as variance shadow maps estimate it (Lauritzen 2008, GPU Gems 3, §8.4.2). Where the
+//!   surface bends towards the light within a texel, that is how much nearer it typically gets.
+//! - 2⁻²⁵ is half a unit in the last place of depths stored in single precision.
+//!
+//! Measured as the share of wrong pixels (`hard`, geometric mean over twelve views of six real
+//! scenes at 960×540 against ray-traced truth; 2048² and 1024² adaptive, 2048² uniform): the plane
+//! alone 0.017 at 2048² adaptive; the receiver's own depth alone 0.24; the minimum without σ 0.0127,
+//! 0.0225, 0.0133; with σ 0.0098, 0.0172, 0.0096; with ½ σ the same; with the half-width of the
+//! footprint, (|∂s| + |∂t|)/2, 0.0106, 0.0184, 0.0104. Most of what is left is the texels' stair-steps.
 
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
@@ -76,8 +97,9 @@ pub fn visibility(
     if map.is_empty() || !is_inside {
         return 1.0;
     }
-    let is_lit = |i, j| f64::from(fetch(i, j)) >= nearest_lit(map, receiver, i, j);
     let texel = texel_coordinates(map, st);
+    let test = Test::new(map, receiver);
+    let is_lit = |i, j| f64::from(fetch(i, j)) >= test.nearest_lit(i, j);
     match filter {
         Filter::Hard => {
             let last = |n: u32| f64::from(n - 1);
@@ -94,19 +116,37 @@ pub fn visibility(
     }
 }
 
-/// The depth from which on a texel does not hide the receiver.
-fn nearest_lit(map: &ShadowMap, receiver: &Receiver, i: i32, j: i32) -> f64 {
-    let [width, height] = map.resolution.map(f64::from);
-    let center = DVec2::new(
-        (f64::from(i) + 0.5) / width,
-        map.rows.t_from_row((f64::from(j) + 0.5) / height),
-    );
-    let rise = receiver.slope.dot(center - receiver.st);
-    if rise.is_nan() {
-        return f64::NEG_INFINITY;
+/// A receiver against the texels of a map.
+struct Test<'a> {
+    map: &'a ShadowMap,
+    receiver: &'a Receiver,
+    /// How much nearer than expected a texel's depth may be.
+    slack: f64,
+}
+
+impl<'a> Test<'a> {
+    fn new(map: &'a ShadowMap, receiver: &'a Receiver) -> Self {
+        let [width, height] = map.resolution.map(f64::from);
+        let per_texel = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
+        let spread = (receiver.slope / per_texel).length() / 12f64.sqrt();
+        let rounding = f64::from(f32::EPSILON) / 4.0;
+        Self { map, receiver, slack: spread + rounding }
     }
-    let rounding = f64::from(f32::EPSILON) / 4.0 + rise.abs() * 1e-12;
-    receiver.depth.min(receiver.depth + rise).min(1.0) - rounding
+
+    /// The depth from which on texel (i, j) does not hide the receiver. An edge-on receiver, of
+    /// infinite slope, is not hidden by anything.
+    fn nearest_lit(&self, i: i32, j: i32) -> f64 {
+        let [width, height] = self.map.resolution.map(f64::from);
+        let center = DVec2::new(
+            (f64::from(i) + 0.5) / width,
+            self.map.rows.t_from_row((f64::from(j) + 0.5) / height),
+        );
+        let depth = self.receiver.depth;
+        // An infinite slope makes the rise infinite or NaN, which `min` ignores, but also the slack.
+        let rise = self.receiver.slope.dot(center - self.receiver.st);
+        // Depths end at 1: what is stored as 1 may lie anywhere behind.
+        depth.min(depth + rise).min(1.0) - self.slack
+    }
 }
 
 /// One side of a box filter: the texels it covers, the first and the last in part.
@@ -133,3 +173,6 @@ impl Span {
         start + inner + end
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,161 @@
+use super::*;
+use crate::plan::{MapError, Rows};
+use glam::DMat4;
+use proptest::prelude::*;
+use std::cell::RefCell;
+
+/// A map whose shadow space is world space.
+fn map(resolution: [u32; 2], rows: Rows) -> ShadowMap {
+    ShadowMap {
+        origin: glam::DVec3::ZERO,
+        shadow_from_local: DMat4::IDENTITY,
+        local_from_shadow: DMat4::IDENTITY,
+        rows,
+        resolution,
+        split: [0.0, 1.0],
+        lambda: None,
+        error: MapError::default(),
+        storage_factor: 1.0,
+        caster_planes: Vec::new(),
+        apex: None,
+    }
+}
+
+fn flat(s: f64, t: f64, depth: f64) -> Receiver {
+    Receiver { st: DVec2::new(s, t), depth, slope: DVec2::ZERO }
+}
+
+fn filters() -> impl Iterator<Item = Filter> {
+    std::iter::once(Filter::Hard).chain((1..=Filter::MAX_PCF).map(|n| Filter::pcf(n).unwrap()))
+}
+
+#[test]
+fn widths_out_of_range_are_named() {
+    for n in [0, 16, u32::MAX] {
+        assert!(Filter::pcf(n).unwrap_err().to_string().starts_with("filter.n"));
+    }
+    assert_eq!(Filter::pcf(5).unwrap().to_string(), "pcf5");
+    assert_eq!(Filter::default().to_string(), "hard");
+}
+
+#[test]
+fn the_nearest_texel_decides() {
+    let map = map([4, 8], Rows::Even);
+    let only = |i, j| if (i, j) == (2, 5) { 0.25 } else { 1.0 };
+    let at = |s, t, depth| visibility(&map, Filter::Hard, &flat(s, t, depth), only);
+    assert_eq!(at(0.51, 0.63, 0.5), 0.0);
+    assert_eq!(at(0.74, 0.74, 0.5), 0.0);
+    assert_eq!(at(0.76, 0.74, 0.5), 1.0);
+    assert_eq!(at(0.51, 0.62, 0.5), 1.0);
+    assert_eq!(at(0.51, 0.63, 0.25), 1.0, "what is stored does not hide itself");
+    // The far border belongs to the last texel.
+    let last = |i, j| if (i, j) == (3, 7) { 0.25 } else { 1.0 };
+    assert_eq!(visibility(&map, Filter::Hard, &flat(1.0, 1.0, 0.5), last), 0.0);
+}
+
+#[test]
+fn boxes_count_by_area() {
+    let map = map([64, 64], Rows::Even);
+    // Dark left of texel column 30: the lit share of the box is linear in the point's place.
+    let depth = |i: i32, _| if i < 30 { 0.1 } else { 1.0 };
+    for n in 1..=Filter::MAX_PCF {
+        for step in 0..200 {
+            let x = 20.0 + f64::from(step) * 0.1 + 0.037;
+            let lit = ((x + f64::from(n) / 2.0 - 30.0) / f64::from(n)).clamp(0.0, 1.0);
+            let receiver = flat(x / 64.0, 0.5003, 0.5);
+            let found = visibility(&map, Filter::Pcf { n }, &receiver, depth);
+            assert!((f64::from(found) - lit).abs() < 1e-6, "{n} at {x}: {found}, not {lit}");
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn lookups_stay_within_reach(s in 0.0..=1.0, t in 0.0..=1.0, w in 1u32..40, h in 1u32..40) {
+        for filter in filters() {
+            let map = map([w, h], Rows::Even);
+            let reach = filter.reach_texels() as i32;
+            let fetched = RefCell::new(Vec::new());
+            visibility(&map, filter, &flat(s, t, 0.5), |i, j| {
+                fetched.borrow_mut().push((i, j));
+                1.0
+            });
+            for (i, j) in fetched.into_inner() {
+                prop_assert!((-reach..w as i32 + reach).contains(&i), "{filter}: {i} of {w}");
+                prop_assert!((-reach..h as i32 + reach).contains(&j), "{filter}: {j} of {h}");
+            }
+        }
+    }
+
+    #[test]
+    fn planes_do_not_hide_themselves(
+        s in 0.0..=1.0, t in 0.0..=1.0, elevation in 0.001f64..1.5, azimuth in 0.0..6.3,
+        ratio in 1.001f64..1e4,
+    ) {
+        // Stored as a map would: the plane's depth at each texel's centre, in single precision.
+        let slope = DVec2::from_angle(azimuth) / elevation.tan();
+        for rows in [Rows::Even, Rows::Logarithmic { ratio }] {
+            let map = map([37, 23], rows);
+            let receiver = Receiver { st: DVec2::new(s, t), depth: 0.4, slope };
+            let stored = |i: i32, j: i32| {
+                let row = (f64::from(j) + 0.5) / 23.0;
+                let center = DVec2::new((f64::from(i) + 0.5) / 37.0, rows.t_from_row(row));
+                (0.4 + slope.dot(center - receiver.st)).clamp(0.0, 1.0) as f32
+            };
+            for filter in filters() {
+                prop_assert_eq!(visibility(&map, filter, &receiver, stored), 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn no_input_makes_a_nan(
+        s: f64, t: f64, depth: f64, ds: f64, dt: f64, stored in 0.0f32..=1.0,
+    ) {
+        for (st, slope) in [
+            (DVec2::new(s, t), DVec2::new(ds, dt)),
+            (DVec2::splat(0.5), DVec2::new(ds, dt)),
+            (DVec2::splat(0.5), DVec2::INFINITY),
+            (DVec2::splat(0.5), DVec2::new(f64::INFINITY, f64::NEG_INFINITY)),
+            (DVec2::NAN, DVec2::NAN),
+        ] {
+            for filter in filters() {
+                let receiver = Receiver { st, depth, slope };
+                let v = visibility(&map([3, 3], Rows::Even), filter, &receiver, |_, _| stored);
+                prop_assert!((0.0..=1.0).contains(&v), "{v}");
+            }
+        }
+    }
+}
+
+#[test]
+fn outside_the_map_or_its_depths_there_is_light() {
+    let all_dark = |_, _| 0.0;
+    for filter in filters() {
+        for (s, t) in [(-1e-9, 0.5), (1.0 + 1e-9, 0.5), (0.5, -3.0), (0.5, 1.1)] {
+            assert_eq!(
+                visibility(&map([8, 8], Rows::Even), filter, &flat(s, t, 0.5), all_dark),
+                1.0
+            );
+        }
+        let empty = map([0, 0], Rows::Even);
+        assert_eq!(visibility(&empty, filter, &flat(0.5, 0.5, 0.5), all_dark), 1.0);
+        let map = map([8, 8], Rows::Even);
+        assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 0.5), all_dark), 0.0);
+        // Nearer than what casts; and behind the map's far end where nothing was hit.
+        assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, -0.1), all_dark), 1.0);
+        assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 1.5), |_, _| 1.0), 1.0);
+        assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 1.5), |_, _| 0.9), 0.0);
+    }
+}
+
+#[test]
+fn texel_coordinates_follow_the_rows() {
+    let rows = Rows::Logarithmic { ratio: 100.0 };
+    let map = map([10, 20], rows);
+    for row in [0.0, 0.25, 0.5, 1.0] {
+        let st = DVec2::new(0.3, rows.t_from_row(row));
+        let texel = texel_coordinates(&map, st);
+        assert!((texel - DVec2::new(3.0, 20.0 * row)).length() < 1e-9, "{texel}");
+    }
+}
