@@ -1,0 +1,80 @@
+use super::occupancy::Occupancy;
+use super::{THUMBNAIL, thumbnail};
+use glam::{DQuat, DVec3};
+use umbrage::Light;
+
+/// A light for a view, and how good it is there.
+pub(super) struct Lighting {
+    pub(super) light: Light,
+    /// Higher is better; at most about 1.
+    pub(super) score: f64,
+}
+
+/// `own`, or else the sun that suits a view: it stands to the side of the viewer, where it lights
+/// most of what is seen and many edges of shadows show. Its elevation is 45°, lower only over land
+/// so gentle that no shadows would fall.
+pub(super) fn lighting(
+    grid: &Occupancy,
+    own: Option<Light>,
+    eye: DVec3,
+    target: DVec3,
+    fov_y_rad: f64,
+) -> Lighting {
+    let seen: Vec<Option<DVec3>> = thumbnail(eye, target, fov_y_rad)
+        .map(|direction| {
+            let sight = grid.look(eye, direction)?;
+            // A little before the surface, so that its own cells do not shade it.
+            let back = 1.5 * grid.cell.max_element() / direction.length();
+            Some(eye + direction * (sight.distance - back).max(0.0))
+        })
+        .collect();
+    // How good a light is, and the share of what is seen that it leaves dark.
+    let judge = |light: &Light| {
+        let is_lit = |p: DVec3| match light {
+            Light::Directional { direction } => grid.look(p, -*direction).is_none(),
+            Light::Spot(spot) => {
+                let to_light = spot.position - p;
+                spot.direction.angle_between(-to_light) < spot.half_angle_rad
+                    && grid.look(p, to_light).is_none_or(|s| s.distance > 1.0)
+            }
+        };
+        let lit: Vec<Option<bool>> = seen.iter().map(|p| p.map(is_lit)).collect();
+        let count = lit.iter().flatten().count().max(1) as f64;
+        let dark = lit.iter().flatten().filter(|&&l| !l).count() as f64 / count;
+        let neighbours = lit.chunks(THUMBNAIL[0] as usize).flat_map(|row| row.windows(2));
+        let edges = neighbours.filter(|w| w[0].zip(w[1]).is_some_and(|(a, b)| a != b));
+        (2.0 * edges.count() as f64 / count - (dark - 0.4).abs(), dark)
+    };
+    if let Some(light) = own {
+        return Lighting { light, score: judge(&light).0 };
+    }
+    let forward = target - eye;
+    let direction = -towards_sun(forward, 100.0, 45.0);
+    let mut best = Lighting { light: Light::Directional { direction }, score: f64::NEG_INFINITY };
+    for elevation_deg in [45.0, 25.0, 12.0] {
+        let mut most_dark: f64 = 0.0;
+        for azimuth_deg in [60.0_f64, 80.0, 100.0, 120.0, 140.0] {
+            for side in [1.0, -1.0] {
+                let to_sun = towards_sun(forward, azimuth_deg * side, elevation_deg);
+                let light = Light::Directional { direction: -to_sun };
+                let (score, dark) = judge(&light);
+                let score = score - 0.003 * (azimuth_deg - 100.0).abs();
+                most_dark = most_dark.max(dark);
+                if score > best.score {
+                    best = Lighting { light, score };
+                }
+            }
+        }
+        if most_dark > 0.02 {
+            break;
+        }
+    }
+    best
+}
+
+/// Unit vector towards a sun to the left of someone looking `forward`.
+pub(super) fn towards_sun(forward: DVec3, azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
+    let (sin, cos) = elevation_deg.to_radians().sin_cos();
+    let ahead = forward.with_y(0.0).normalize_or(DVec3::NEG_Z);
+    DQuat::from_rotation_y(azimuth_deg.to_radians()) * ahead * cos + DVec3::Y * sin
+}
