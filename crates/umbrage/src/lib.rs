@@ -48,3 +48,8 @@ pub use light::{Light, SpotLight};
 pub use options::{Objective, Options, Size, Warp};
 pub use plan::{Beam, MapError, Plan, Receiver, Rows, ShadowMap};
 pub use planner::Planner;
+
+/// The README's examples are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
