@@ -2,7 +2,7 @@ use crate::{Error, Progress, Ray, Surface, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
-use umbrage::{Camera, Light};
+use umbrage::{Camera, Light, SpotLight};
 
 /// Samples held at a time, about: some 100 MB.
 const BAND_SAMPLES: u64 = 1 << 19;
@@ -117,8 +117,8 @@ impl<'a> View<'a> {
 
     /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
     ///
-    /// For a spot light only what lies beyond its `near` distance casts, as [`umbrage::SpotLight`]
-    /// has it; and nothing nearer than that receives a shadow.
+    /// All that lies before a spot light casts, its own housing too; what is nearer to it than
+    /// `near` gets no shadow, as [`SpotLight`](umbrage::SpotLight) has it.
     pub fn truth(&self, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
@@ -126,11 +126,8 @@ impl<'a> View<'a> {
         let position = sample.surface.position;
         let (direction, end) = match self.light {
             Light::Directional { direction } => (-direction, f64::INFINITY),
-            Light::Spot(spot) => {
-                let to_light = spot.position - position;
-                let depth = -spot.direction.normalize_or_zero().dot(to_light);
-                (to_light, 1.0 - spot.near / depth)
-            }
+            Light::Spot(spot) if spot_depth(&spot, position) < spot.near => return 1.0,
+            Light::Spot(spot) => (spot.position - position, 1.0),
         };
         let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
         f32::from(u8::from(!is_dark))
@@ -204,8 +201,13 @@ fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
         Light::Directional { .. } => true,
         Light::Spot(spot) => {
             let axis = spot.direction.normalize_or_zero();
-            let depth = axis.dot(position - spot.position);
-            depth <= spot.range && -axis.dot(to_light) >= spot.half_angle_rad.cos()
+            spot_depth(spot, position) <= spot.range
+                && -axis.dot(to_light) >= spot.half_angle_rad.cos()
         }
     }
+}
+
+/// Distance from a spot light along its axis, metres.
+fn spot_depth(spot: &SpotLight, position: DVec3) -> f64 {
+    spot.direction.normalize_or_zero().dot(position - spot.position)
 }

@@ -24,7 +24,7 @@ pub struct SpotLight {
     /// Half the cone's opening angle, radians, in (0, 85°]. Nothing outside is lit.
     pub half_angle_rad: f64,
     /// Distance from the light, measured along the axis, at which shadows begin, metres, > 0.
-    /// Casters nearer than this are missed; receivers nearer than this get no shadow.
+    /// Receivers nearer than this get no shadow; casters nearer than this cast onto those beyond.
     pub near: f64,
     /// Distance along the axis at which light ends, metres, > `near`.
     pub range: f64,
