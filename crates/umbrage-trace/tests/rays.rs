@@ -2,48 +2,13 @@
 
 mod common;
 
-use common::{Random, at, ground, scene, sheet, soup, sphere};
+use common::{Random, all_hits, at, ground, scene, sheet, soup, sphere};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
 use umbrage_scene::{Alpha, Instance, Scene, Texture, TextureId};
-use umbrage_trace::{Error, PrimitiveRef, Ray, Tracer};
+use umbrage_trace::{Error, Ray, Tracer};
 
 const EVERYWHERE: [f64; 2] = [0.0, f64::INFINITY];
-
-/// All hits of a ray by Möller and Trumbore's test over every triangle in world space, with how far
-/// inside its triangle each lies (barycentric); near zero, rounding may put it in or out.
-fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)> {
-    let mut hits = Vec::new();
-    for (i, instance) in scene.instances.iter().enumerate() {
-        let mesh = &scene.meshes[instance.mesh];
-        for (j, triangle) in mesh.triangles.iter().enumerate() {
-            let [a, b, c] = triangle.map(|k| {
-                let corner = mesh.positions[k as usize].as_dvec3();
-                instance.world_from_mesh.transform_point3(corner)
-            });
-            let (e1, e2) = (b - a, c - a);
-            if e1.cross(e2) == DVec3::ZERO {
-                continue;
-            }
-            let p = ray.direction.cross(e2);
-            let determinant = e1.dot(p);
-            let s = ray.origin - a;
-            let q = s.cross(e1);
-            let (u, v) = (s.dot(p) / determinant, ray.direction.dot(q) / determinant);
-            let t = e2.dot(q) / determinant;
-            let area = e1.cross(e2).length();
-            // Edge-on there is no saying.
-            let is_clear = determinant.abs() > 1e-9 * area * ray.direction.length();
-            let margin = if is_clear { u.min(v).min(1.0 - u - v) } else { 0.0 };
-            if t.is_finite() && margin > -1e-6 && t > 0.0 {
-                let primitive = PrimitiveRef { instance: i as u32, triangle: j as u32 };
-                hits.push((t, primitive, margin));
-            }
-        }
-    }
-    hits.sort_by(|a, b| a.0.total_cmp(&b.0));
-    hits
-}
 
 /// Compares tree and brute force for one ray; `false` if rounding could decide either way.
 fn agrees(tracer: &Tracer<'_>, ray: Ray, tolerance: f64) -> Result<bool, TestCaseError> {

@@ -4,7 +4,7 @@
 use glam::{DAffine3, DMat4, DVec2, DVec3, Vec2, Vec3, Vec4};
 use umbrage::{Camera, LookAt, MapError, Rows, ShadowMap};
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene};
-use umbrage_trace::{Hit, PrimitiveRef, Surface, Tracer};
+use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer};
 
 pub(crate) fn nobody(_rows: u64) {}
 
@@ -143,13 +143,44 @@ pub(crate) fn below(tracer: &Tracer<'_>, point: DVec3) -> Surface {
 
 /// The first surface in `direction` of `point`.
 pub(crate) fn towards(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> Surface {
-    let ray = umbrage_trace::Ray { origin, direction };
+    let ray = Ray { origin, direction };
     let hit = tracer.closest(ray, [0.0, f64::INFINITY]).expect("a surface there");
     tracer.surface(&hit, direction)
 }
 
-pub(crate) fn primitive(hit: &Hit) -> PrimitiveRef {
-    hit.primitive
+/// All hits of a ray by Möller and Trumbore's test over every triangle in world space, with how far
+/// inside its triangle each lies (barycentric); near zero, rounding may put it in or out.
+pub(crate) fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)> {
+    let mut hits = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh];
+        for (j, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|k| {
+                let corner = mesh.positions[k as usize].as_dvec3();
+                instance.world_from_mesh.transform_point3(corner)
+            });
+            let (e1, e2) = (b - a, c - a);
+            if e1.cross(e2) == DVec3::ZERO {
+                continue;
+            }
+            let p = ray.direction.cross(e2);
+            let determinant = e1.dot(p);
+            let s = ray.origin - a;
+            let q = s.cross(e1);
+            let (u, v) = (s.dot(p) / determinant, ray.direction.dot(q) / determinant);
+            let t = e2.dot(q) / determinant;
+            let area = e1.cross(e2).length();
+            // Edge-on there is no saying.
+            let is_clear = determinant.abs() > 1e-9 * area * ray.direction.length();
+            let margin = if is_clear { u.min(v).min(1.0 - u - v) } else { 0.0 };
+            if t.is_finite() && margin > -1e-6 && t > 0.0 {
+                let primitive = PrimitiveRef { instance: i as u32, triangle: j as u32 };
+                hits.push((t, primitive, margin));
+            }
+        }
+    }
+    hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+    hits
 }
 
 /// Reproducible numbers in [0, 1): SplitMix64.
