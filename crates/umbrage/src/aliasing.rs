@@ -35,7 +35,7 @@ impl Footprint {
     pub fn longest(&self) -> f64 {
         let (s, t) = (self.per_s.length_squared(), self.per_t.length_squared());
         let mixed = self.per_s.dot(self.per_t);
-        (s.midpoint(t) + ((s - t) / 2.0).hypot(mixed)).sqrt()
+        (s.midpoint(t) + DVec2::new((s - t) / 2.0, mixed).length()).sqrt()
     }
 }
 
@@ -165,7 +165,7 @@ impl ShadowMap {
         let m = pixels * adjugate;
         let (a, b) = (m.x_axis.length_squared(), m.y_axis.length_squared());
         let mixed = m.x_axis.dot(m.y_axis);
-        let larger = (a.midpoint(b) + ((a - b) / 2.0).hypot(mixed)).sqrt();
+        let larger = (a.midpoint(b) + DVec2::new((a - b) / 2.0, mixed).length()).sqrt();
         let smaller = if larger > 0.0 { m.determinant().abs() / larger } else { 0.0 };
         Some(SurfaceError { worst: larger / det.abs(), best: smaller / det.abs() })
     }

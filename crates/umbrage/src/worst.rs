@@ -19,7 +19,7 @@ use crate::focus::ConvexBody;
 use crate::plan::{MapError, Rows, ShadowMap};
 use glam::DVec3;
 use std::cmp::Ordering;
-use std::collections::{BinaryHeap, binary_heap::PeekMut};
+use std::collections::BinaryHeap;
 
 /// The reported maximum may exceed the true one by this share.
 const TOLERANCE: f64 = 0.01;
@@ -45,9 +45,8 @@ struct Corner {
 
 #[derive(Clone, Copy, Debug)]
 struct Simplex {
-    /// The third corner repeats the second on an edge.
-    corners: [Corner; 3],
-    is_edge: bool,
+    /// Indices of corners. The third repeats the second on an edge.
+    corners: [u32; 3],
     /// Upper bounds of the errors.
     bound: [f64; 3],
     /// Largest ratio of a bound to the best value known when the bound was found.
@@ -78,6 +77,7 @@ impl Eq for Simplex {}
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch {
     corners: Vec<Corner>,
+    /// Simplices whose bound exceeds the best value known by more than the tolerance.
     open: BinaryHeap<Simplex>,
 }
 
@@ -89,33 +89,32 @@ pub(crate) fn worst_errors(
     camera: &Camera,
     scratch: &mut Scratch,
 ) -> MapError {
-    let search = Search { map, camera };
     let Scratch { corners, open } = scratch;
+    let probe = Probe { map, camera };
     corners.clear();
-    corners.extend(body.vertices().iter().filter_map(|&v| search.corner(v)));
-    let mut best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
+    corners.extend(body.vertices().iter().filter_map(|&v| probe.corner(v)));
+    open.clear();
+    let best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
+    let mut search = Search { probe, corners, open, best, settled: best };
     // A corner that the map does not reach would be a fault of the fit.
-    debug_assert_eq!(corners.len(), body.vertices().len());
-    if corners.len() == body.vertices().len() {
-        open.clear();
-        let simplex =
-            |i: [usize; 3], is_edge| search.simplex(i.map(|i| corners[i]), is_edge, &best);
-        if search.edges_suffice() {
-            open.extend(body.edges().map(|[a, b]| simplex([a, b, b], true)));
+    debug_assert_eq!(search.corners.len(), body.vertices().len());
+    if search.corners.len() == body.vertices().len() {
+        if search.probe.edges_suffice() {
+            body.edges().for_each(|[a, b]| search.add([a, b, b].map(|i| i as u32)));
         } else {
-            open.extend(body.triangles().map(|t| simplex(t, false)));
+            body.triangles().for_each(|t| search.add(t.map(|i| i as u32)));
         }
         for _ in 0..MAX_SPLITS {
-            let most_urgent = match open.peek_mut() {
-                Some(simplex) if simplex.urgency > 1.0 + TOLERANCE => PeekMut::pop(simplex),
-                _ => break,
-            };
-            search.split(&most_urgent, &mut best, open);
+            let Some(most_urgent) = search.open.pop() else { break };
+            // `best` may have grown since.
+            if !search.settle(most_urgent.bound) {
+                search.split(&most_urgent);
+            }
         }
-        best = open.iter().fold(best, |best, s| larger(best, s.bound));
     }
+    let bounds = search.open.iter().fold(search.settled, |bounds, s| larger(bounds, s.bound));
     let pixel = camera.pixel_width_per_depth();
-    let [max_s, max_t, max] = best.map(|e| e / pixel);
+    let [max_s, max_t, max] = larger(search.best, bounds).map(|e| e / pixel);
     MapError { max_s, max_t, max }
 }
 
@@ -124,11 +123,73 @@ fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 struct Search<'a> {
+    probe: Probe<'a>,
+    corners: &'a mut Vec<Corner>,
+    open: &'a mut BinaryHeap<Simplex>,
+    /// Largest errors found.
+    best: [f64; 3],
+    /// Bounds of what was put aside because it exceeds `best` by no more than the tolerance.
+    settled: [f64; 3],
+}
+
+impl Search<'_> {
+    fn add(&mut self, corners: [u32; 3]) {
+        let is_edge = corners[1] == corners[2];
+        let [a, b, c] = corners.map(|i| self.corners[i as usize]);
+        let mut bound = self.probe.bound(&[a, b, c]);
+        if is_edge {
+            // B's first column is constant and w²/z convex: corners have the largest m_s and m_t.
+            // With logarithmic rows A itself is affine, and corners have the largest of all.
+            let exact = if self.probe.map.rows == Rows::Even { 2 } else { 3 };
+            bound[..exact].copy_from_slice(&larger(a.errors, b.errors)[..exact]);
+        }
+        if !self.settle(bound) {
+            let urgency =
+                [0, 1, 2].map(|i| bound[i] / self.best[i]).into_iter().fold(0.0, f64::max);
+            self.open.push(Simplex { corners, bound, urgency });
+        }
+    }
+
+    /// Puts a simplex aside if its bounds are within the tolerance.
+    fn settle(&mut self, bound: [f64; 3]) -> bool {
+        let settles = (0..3).all(|i| bound[i] <= self.best[i] * (1.0 + TOLERANCE));
+        if settles {
+            self.settled = larger(self.settled, bound);
+        }
+        settles
+    }
+
+    /// Halves a simplex across its longest side.
+    fn split(&mut self, simplex: &Simplex) {
+        let [a, b, c] = simplex.corners;
+        let is_edge = b == c;
+        // View depth decides what "long" means: far away, less matters.
+        let length = |&(u, v, _): &(u32, u32, u32)| {
+            let [u, v] = [u, v].map(|i| &self.corners[i as usize]);
+            u.p.distance_squared(v.p) / (u.z * v.z)
+        };
+        let sides = [(a, b, c), (b, c, a), (c, a, b)];
+        let longest = sides.into_iter().max_by(|p, q| length(p).total_cmp(&length(q)));
+        let (u, v, rest) = if is_edge { sides[0] } else { longest.unwrap_or(sides[0]) };
+        // The point halfway in 1/z keeps the two halves' ranges of z alike.
+        let [p, q] = [u, v].map(|i| &self.corners[i as usize]);
+        let Some(middle) = self.probe.corner(p.p.lerp(q.p, p.z / (p.z + q.z))) else { return };
+        self.best = larger(self.best, middle.errors);
+        let m = self.corners.len() as u32;
+        self.corners.push(middle);
+        for (p, q) in [(u, m), (m, v)] {
+            self.add([p, q, if is_edge { q } else { rest }]);
+        }
+    }
+}
+
+/// What is known of errors at a point and over a simplex.
+struct Probe<'a> {
     map: &'a ShadowMap,
     camera: &'a Camera,
 }
 
-impl Search<'_> {
+impl Probe<'_> {
     fn corner(&self, p: DVec3) -> Option<Corner> {
         let local = Local::at(self.map, p)?;
         let footprint = local.footprint();
@@ -148,42 +209,6 @@ impl Search<'_> {
     fn edges_suffice(&self) -> bool {
         let [t, w] = [1, 3].map(|i| self.map.shadow_from_local.row(i).truncate());
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
-    }
-
-    fn simplex(&self, corners: [Corner; 3], is_edge: bool, best: &[f64; 3]) -> Simplex {
-        let mut bound = self.bound(&corners);
-        if is_edge {
-            // B's first column is constant and w²/z convex: corners have the largest m_s and m_t.
-            // With logarithmic rows A itself is affine, and corners have the largest of all.
-            let [a, b, _] = corners.map(|c| c.errors);
-            let at_corners = larger(a, b);
-            let exact = if self.map.rows == Rows::Even { 2 } else { 3 };
-            bound[..exact].copy_from_slice(&at_corners[..exact]);
-        }
-        let urgency = [0, 1, 2].map(|i| bound[i] / best[i]).into_iter().fold(0.0, f64::max);
-        Simplex { corners, is_edge, bound, urgency }
-    }
-
-    /// Halves a simplex across its longest side.
-    fn split(&self, simplex: &Simplex, best: &mut [f64; 3], open: &mut BinaryHeap<Simplex>) {
-        let [a, b, c] = simplex.corners;
-        // View depth decides what "long" means: far away, less matters.
-        let length = |u: &Corner, v: &Corner| u.p.distance_squared(v.p) / (u.z * v.z);
-        let sides = [(a, b, c), (b, c, a), (c, a, b)];
-        let (u, v, rest) = if simplex.is_edge {
-            sides[0]
-        } else {
-            let longest =
-                sides.iter().max_by(|p, q| length(&p.0, &p.1).total_cmp(&length(&q.0, &q.1)));
-            longest.copied().unwrap_or(sides[0])
-        };
-        // The point halfway in 1/z keeps the two halves' ranges of z alike.
-        let Some(m) = self.corner(u.p.lerp(v.p, u.z / (u.z + v.z))) else { return };
-        *best = larger(*best, m.errors);
-        for (p, q) in [(u, m), (m, v)] {
-            let third = if simplex.is_edge { q } else { rest };
-            open.push(self.simplex([p, q, third], simplex.is_edge, best));
-        }
     }
 
     /// Upper bounds for s, t and worst over a simplex.
