@@ -113,31 +113,17 @@ impl OnePoint {
         space: &LightSpace,
         camera: &Camera,
     ) -> f64 {
-        let sin_theta = space.theta_rad.sin();
-        let (n, f) = (self.nearest, self.farthest);
-        // Light-space units per metre of the light plane: 1 for directional lights. Looking along the
-        // light it loses its meaning, and so does every warp that follows the view.
-        let unit = space.z_per_view_metre / sin_theta;
-        if !(sin_theta > 1e-12 && unit > 0.0)
-            && !matches!(warp, Warp::Lambda(_) | Warp::Adaptive(_))
-        {
-            return 0.0;
-        }
-        let mu_metres = self.mu / unit;
-        // Strength of the view's own perspective, λ = n/sin θ.
-        let nu_perspective = sin_theta * mu_metres / n;
         match warp {
             Warp::Unfocused | Warp::Uniform | Warp::Psm => 0.0,
             Warp::Lambda(lambda) => self.mu / lambda,
             Warp::Adaptive(objective) => least_error(self, seen, objective),
-            Warp::Log => nu_perspective,
-            Warp::Lispsm => {
-                let f = n + (f - n).min(mu_metres * sin_theta);
-                sin_theta * mu_metres / (n + (n * f).sqrt())
-            }
-            Warp::Tsm { focus } => {
-                let focus = focus.unwrap_or((n * f).sqrt());
-                let focus = camera.forward() * focus;
+            Warp::Lispsm => self.along_view(space, |view| {
+                let f = view.n + (view.f - view.n).min(view.mu_metres * view.sin_theta);
+                view.strength(view.n + (view.n * f).sqrt())
+            }),
+            Warp::Log => self.along_view(space, |view| view.strength(view.n)),
+            Warp::Tsm { focus } => self.along_view(space, |view| {
+                let focus = camera.forward() * focus.unwrap_or((view.n * view.f).sqrt());
                 let delta = space.project(focus).0.y - self.z0;
                 let is_before_light = space.w.dot(focus.extend(1.0)) > 0.0;
                 if !is_before_light || delta >= 0.8 * self.mu {
@@ -148,8 +134,42 @@ impl OnePoint {
                 // The rule itself goes on warping as the view turns into the light, where z has no
                 // direction to follow. From θ = φ on it fades out.
                 let phi = camera.tan_half_fov_y().atan();
-                nu.min(nu_perspective) * (sin_theta / phi.sin()).min(1.0)
-            }
+                nu.min(view.strength(view.n)) * (view.sin_theta / phi.sin()).min(1.0)
+            }),
         }
+    }
+
+    /// A strength that follows from the view; none where the view runs along the light and z has no
+    /// direction to follow.
+    fn along_view(&self, space: &LightSpace, strength: impl FnOnce(AlongView) -> f64) -> f64 {
+        let sin_theta = space.theta_rad.sin();
+        if sin_theta <= 1e-12 || space.z_per_view_metre <= 0.0 {
+            return 0.0;
+        }
+        // Metres of the light plane per unit of light-space z: 1 for directional lights.
+        let metres = sin_theta / space.z_per_view_metre;
+        strength(AlongView {
+            sin_theta,
+            n: self.nearest,
+            f: self.farthest,
+            mu_metres: self.mu * metres,
+        })
+    }
+}
+
+/// What the papers' rules for λ are made of.
+struct AlongView {
+    sin_theta: f64,
+    /// View distance of the nearest and the farthest point seen, metres.
+    n: f64,
+    f: f64,
+    /// The warp's depth range μ, metres.
+    mu_metres: f64,
+}
+
+impl AlongView {
+    /// Strength of the warp with λ = `overhead`/sin θ, metres.
+    fn strength(&self, overhead: f64) -> f64 {
+        self.sin_theta * self.mu_metres / overhead
     }
 }
