@@ -43,7 +43,7 @@ fn cases() -> Vec<Case> {
             scene: load(&dragons),
             eye: DVec3::new(2.0, 1.2, 7.5),
             target: DVec3::new(-1.0, 0.3, 0.0),
-            travel: DVec3::new(-0.57923, -0.70711, -0.40558),
+            travel: DVec3::new(-0.57923, -0.707, -0.40558),
         },
     ]
 }

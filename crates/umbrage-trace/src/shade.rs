@@ -1,6 +1,6 @@
 //! Samples as pictures: in the light of a sun and a sky, or as data to look at.
 
-use crate::{Band, MapTexel, Sample, View};
+use crate::{Band, Sample, View};
 use glam::{DVec2, DVec3, Vec3};
 use umbrage::{Camera, Light};
 
@@ -133,31 +133,49 @@ pub fn depth_color(camera: &Camera, depth: f64) -> [u8; 3] {
     [((1.0 - relative.clamp(0.0, 1.0)) * 255.0).round() as u8; 3]
 }
 
-/// A colour for each of a plan's maps, light enough to be multiplied with a picture.
-pub fn partition_color(map: usize) -> [u8; 3] {
-    // Okabe and Ito's palette, told apart by the colour-blind too, lightened.
-    const COLORS: [[u8; 3]; 7] = [
-        [242, 198, 96],
-        [136, 204, 240],
-        [96, 198, 164],
-        [246, 238, 130],
-        [102, 164, 218],
-        [232, 146, 96],
-        [222, 162, 196],
-    ];
-    COLORS[map % COLORS.len()]
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbrage::LookAt;
 
-/// The texel grid as a chequerboard in the map's colour: squares of one texel, within squares of
-/// sixteen that show the grid where single texels are too small to see.
-pub fn texel_color(place: &MapTexel) -> [u8; 3] {
-    let square = |size: f64| {
-        let cell = (place.texel / size).floor();
-        (cell.x + cell.y).rem_euclid(2.0)
-    };
-    let brightness = 0.35 + 0.4 * square(1.0) + 0.25 * square(16.0);
-    partition_color(place.map).map(|c| (f64::from(c) * brightness).round() as u8)
-}
+    #[test]
+    fn compression_keeps_order_hue_and_range() {
+        let mut last = -1.0;
+        for i in 0..2000 {
+            let gray = compress(Vec3::splat(i as f32 * 0.01));
+            assert!(gray.x > last && gray.x < 1.0, "{i}: {gray}");
+            last = gray.x;
+            let warm = compress(Vec3::new(1.0, 0.8, 0.5) * (i as f32 * 0.01));
+            assert!(warm.x >= warm.y && warm.y >= warm.z && warm.max_element() < 1.0, "{warm}");
+        }
+        assert_eq!(compress(Vec3::splat(-1.0)), Vec3::ZERO);
+    }
 
-/// The colour of what no map serves, and of the sky, in pictures of data.
-pub const NOTHING: [u8; 3] = [24, 24, 28];
+    #[test]
+    fn srgb_is_as_the_standard_has_it() {
+        assert_eq!(encode(Vec3::new(0.0, 1.0, 7.0)), [0, 255, 255]);
+        assert_eq!(encode(Vec3::new(0.214, 0.001, f32::NAN)), [127, 3, 0]);
+    }
+
+    #[test]
+    fn data_has_its_colours() {
+        assert_eq!(normal_color(DVec3::new(0.0, 1.0, -1.0)), [128, 255, 0]);
+        let camera = Camera::look_at(LookAt {
+            eye: DVec3::ZERO,
+            target: DVec3::Z,
+            up: DVec3::Y,
+            fov_y_rad: 1.0,
+            near: 0.1,
+            far: 1000.0,
+            image: [4, 4],
+        })
+        .unwrap();
+        let grays = [0.01, 0.1, 10.0, 1000.0, 1e9].map(|d| depth_color(&camera, d)[0]);
+        assert_eq!(grays, [255, 255, 128, 0, 0]);
+        for y in 0..4 {
+            let light = Light::Directional { direction: -DVec3::Y };
+            let color = sky(&light, &camera, DVec2::new(2.0, f64::from(y)));
+            assert!(color.is_finite() && color.min_element() > 0.0);
+        }
+    }
+}

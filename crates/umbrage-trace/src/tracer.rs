@@ -1,7 +1,9 @@
 use crate::boxes::Boxes;
+use crate::check::check_mesh;
+use crate::placement::{Placement, stretch};
 use crate::triangle::{ShearedRay, TriangleHit};
 use crate::{Error, Ray};
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture};
@@ -80,16 +82,6 @@ struct Mask<'a> {
     texture: Option<&'a Texture>,
 }
 
-/// An instance's transform, split into what rays need.
-struct Placement {
-    mesh: usize,
-    world_from_mesh: DAffine3,
-    /// Takes directions, and positions relative to the instance's own.
-    mesh_from_world: DMat3,
-    /// Bound of how much the transform stretches any vector.
-    stretch: f64,
-}
-
 /// A ray leaving a surface.
 #[derive(Clone, Copy)]
 struct Departure {
@@ -118,9 +110,9 @@ impl<'a> Tracer<'a> {
         let placed = placements.iter().map(|p| p.bounds(mesh_bounds[p.mesh]));
         let placed: Vec<Aabb> = placed.collect();
         let bounds = placed.iter().fold(Aabb::EMPTY, |all, &b| all.union(b));
-        let beyond =
-            |b: &Aabb| !b.is_empty() && !(b.min.abs().max(b.max.abs()).max_element() <= 1e12);
-        if let Some(i) = placed.iter().position(beyond) {
+        let is_within =
+            |b: &Aabb| b.is_empty() || b.min.abs().max(b.max.abs()).cmple(DVec3::splat(1e12)).all();
+        if let Some(i) = placed.iter().position(|b| !is_within(b)) {
             let problem = "must lie within 1e12 metres of the origin";
             return Err(Error::scene(format!("instances[{i}]"), problem));
         }
@@ -288,9 +280,11 @@ impl<'a> Tracer<'a> {
         range: [f64; 2],
         mut visit: impl FnMut(PrimitiveRef, &TriangleHit) -> Option<f64>,
     ) {
-        let is_ray =
-            ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != DVec3::ZERO;
-        if !is_ray || !(range[0] < range[1]) {
+        let is_ray = ray.origin.is_finite()
+            && ray.direction.is_finite()
+            && ray.direction != DVec3::ZERO
+            && range[0] < range[1];
+        if !is_ray {
             return;
         }
         let mut end = range[1];
@@ -338,46 +332,6 @@ impl<'a> MeshBoxes<'a> {
     }
 }
 
-impl Placement {
-    fn new(scene: &Scene, index: usize) -> Result<Self, Error> {
-        let instance = &scene.instances[index];
-        let wrong = |field: &str, problem: &str| {
-            Err(Error::scene(format!("instances[{index}].{field}"), problem))
-        };
-        if instance.mesh >= scene.meshes.len() {
-            return wrong("mesh", "names a mesh that does not exist");
-        }
-        let world_from_mesh = instance.world_from_mesh;
-        let mesh_from_world = world_from_mesh.matrix3.inverse();
-        if !world_from_mesh.is_finite() || !mesh_from_world.is_finite() {
-            return wrong("world_from_mesh", "must be finite and invertible");
-        }
-        let stretch = stretch(world_from_mesh.matrix3);
-        Ok(Self { mesh: instance.mesh, world_from_mesh, mesh_from_world, stretch })
-    }
-
-    fn bounds(&self, mesh_bounds: Aabb) -> Aabb {
-        if mesh_bounds.is_empty() {
-            return Aabb::EMPTY;
-        }
-        Aabb::around(mesh_bounds.corners().map(|c| self.world_from_mesh.transform_point3(c)))
-    }
-
-    /// How far from `position` its triangle may have been meant to be, metres.
-    ///
-    /// Each coordinate of a corner was rounded by up to 2⁻²⁴ of itself when it was stored, a corner
-    /// thus moved by up to √3·2⁻²⁴ of the largest coordinate, and the triangle by as much. The steps in
-    /// double precision (interpolation, transform and back) are some ten roundings of 2⁻⁵³ of the
-    /// mesh's and the world's coordinates; the former vanish beside 2⁻²⁴, the latter do not far from
-    /// the origin.
-    fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
-        let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
-        let world =
-            position.abs().max_element() + self.world_from_mesh.translation.abs().max_element();
-        largest * self.stretch * 2f64.powi(-23) + world * 2f64.powi(-49)
-    }
-}
-
 fn corners(mesh: &Mesh, triangle: u32) -> [DVec3; 3] {
     mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3())
 }
@@ -404,45 +358,4 @@ fn texture_coordinates(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) 
 fn texture_of<'a>(scene: &'a Scene, material: &Material, mesh: &Mesh) -> Option<&'a Texture> {
     let id = material.base_color_texture.filter(|_| !mesh.uvs.is_empty())?;
     Some(&scene.textures[id.0])
-}
-
-/// How much a transform stretches any vector, at most; exact without shear. The square of the largest
-/// singular value is the largest eigenvalue of MᵀM, which no row sum's maximum is below.
-fn stretch(m: DMat3) -> f64 {
-    let square = m.transpose() * m;
-    let row_sums = square.x_axis.abs() + square.y_axis.abs() + square.z_axis.abs();
-    row_sums.max_element().sqrt()
-}
-
-fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
-    let wrong = |field: String, problem: String| {
-        Err(Error::scene(format!("meshes[{index}].{field}"), problem))
-    };
-    let count = mesh.positions.len();
-    if let Some(i) =
-        mesh.positions.iter().position(|p| !p.is_finite() || p.abs().max_element() > 1e12)
-    {
-        return wrong(format!("positions[{i}]"), "must be finite and at most 1e12".into());
-    }
-    for (field, length) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
-        if length != 0 && length != count {
-            let problem = format!("has {length} entries for {count} positions");
-            return wrong(field.into(), problem);
-        }
-    }
-    if u32::try_from(mesh.triangles.len()).is_err() {
-        return wrong("triangles".into(), "must be fewer than 2^32".into());
-    }
-    let out_of_range = |t: &[u32; 3]| t.iter().any(|&i| i as usize >= count);
-    if let Some(i) = mesh.triangles.iter().position(out_of_range) {
-        return wrong(format!("triangles[{i}]"), format!("must index {count} positions"));
-    }
-    let Some(material) = scene.materials.get(mesh.material) else {
-        return wrong("material".into(), "names a material that does not exist".into());
-    };
-    if material.base_color_texture.is_some_and(|t| t.0 >= scene.textures.len()) {
-        let place = format!("materials[{}].base_color_texture", mesh.material);
-        return Err(Error::scene(place, "names a texture that does not exist"));
-    }
-    Ok(())
 }

@@ -63,7 +63,7 @@ fn a_real_level_comes_out_right() {
         image: [480, 270],
     })
     .unwrap();
-    let light = Light::Directional { direction: DVec3::new(-0.57923, -0.70711, -0.40558) };
+    let light = Light::Directional { direction: DVec3::new(-0.57923, -0.707, -0.40558) };
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let band = view.band(0..270, &nobody);
     let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());

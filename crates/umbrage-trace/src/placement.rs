@@ -1,0 +1,62 @@
+use crate::Error;
+use glam::{DAffine3, DMat3, DVec3};
+use umbrage::Aabb;
+use umbrage_scene::Scene;
+
+/// An instance's transform, split into what rays need.
+pub(crate) struct Placement {
+    pub(crate) mesh: usize,
+    pub(crate) world_from_mesh: DAffine3,
+    /// Takes directions, and positions relative to the instance's own.
+    pub(crate) mesh_from_world: DMat3,
+    /// Bound of how much the transform stretches any vector.
+    stretch: f64,
+}
+
+impl Placement {
+    pub(crate) fn new(scene: &Scene, index: usize) -> Result<Self, Error> {
+        let instance = &scene.instances[index];
+        let wrong = |field: &str, problem: &str| {
+            Err(Error::scene(format!("instances[{index}].{field}"), problem))
+        };
+        if instance.mesh >= scene.meshes.len() {
+            return wrong("mesh", "names a mesh that does not exist");
+        }
+        let world_from_mesh = instance.world_from_mesh;
+        let mesh_from_world = world_from_mesh.matrix3.inverse();
+        if !world_from_mesh.is_finite() || !mesh_from_world.is_finite() {
+            return wrong("world_from_mesh", "must be finite and invertible");
+        }
+        let stretch = stretch(world_from_mesh.matrix3);
+        Ok(Self { mesh: instance.mesh, world_from_mesh, mesh_from_world, stretch })
+    }
+
+    pub(crate) fn bounds(&self, mesh_bounds: Aabb) -> Aabb {
+        if mesh_bounds.is_empty() {
+            return Aabb::EMPTY;
+        }
+        Aabb::around(mesh_bounds.corners().map(|c| self.world_from_mesh.transform_point3(c)))
+    }
+
+    /// How far from `position` its triangle may have been meant to be, metres.
+    ///
+    /// Each coordinate of a corner was rounded by up to 2⁻²⁴ of itself when it was stored, a corner
+    /// thus moved by up to √3·2⁻²⁴ of the largest coordinate, and the triangle by as much. The steps in
+    /// double precision (interpolation, transform and back) are some ten roundings of 2⁻⁵³ of the
+    /// mesh's and the world's coordinates; the former vanish beside 2⁻²⁴, the latter do not far from
+    /// the origin.
+    pub(crate) fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
+        let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
+        let world =
+            position.abs().max_element() + self.world_from_mesh.translation.abs().max_element();
+        largest * self.stretch * 2f64.powi(-23) + world * 2f64.powi(-49)
+    }
+}
+
+/// How much a transform stretches any vector, at most; exact without shear. The square of the largest
+/// singular value is the largest eigenvalue of MᵀM, which no row sum's maximum is below.
+pub(crate) fn stretch(m: DMat3) -> f64 {
+    let square = m.transpose() * m;
+    let row_sums = square.x_axis.abs() + square.y_axis.abs() + square.z_axis.abs();
+    row_sums.max_element().sqrt()
+}
