@@ -180,7 +180,7 @@ fn shadows_end_within_a_texel_of_where_they_should() {
         let reach = |n: f64| 0.5 * n * texel * 2f64.sqrt() / 0.66;
         let is_clear = |margin: f64| {
             (0..16).all(|k| {
-                let around = DVec2::from_angle(f64::from(k) * 0.3927) * margin;
+                let around = DVec2::from_angle(f64::from(k) * std::f64::consts::FRAC_PI_8) * margin;
                 let near = surface.position + DVec3::new(around.x, 0.0, around.y);
                 pole_shadows(near, travel) == expected
             })
