@@ -318,7 +318,8 @@ fn rays_that_are_none_hit_nothing() {
 #[test]
 fn broken_scenes_are_named() {
     let good = || scene(vec![ground(1.0)], &[(0, DAffine3::IDENTITY)]);
-    let cases: [(&str, fn(&mut Scene)); 8] = [
+    type Breakage = fn(&mut Scene);
+    let cases: [(&str, Breakage); 8] = [
         ("meshes[0].positions[2]", |s| s.meshes[0].positions[2].y = f32::NAN),
         ("meshes[0].triangles[1]", |s| s.meshes[0].triangles[1] = [0, 1, 4]),
         ("meshes[0].normals", |s| s.meshes[0].normals.truncate(2)),

@@ -7,7 +7,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use umbrage::{Light, SpotLight};
 use umbrage_scene::closed_form::{SPHERE_RADIUS, pole_shadows, slit_shadows, sphere_shadows};
 use umbrage_scene::{Mesh, Scene, builtin};
-use umbrage_trace::{Ray, Surface, Tracer, View};
+use umbrage_trace::{Band, Ray, Surface, Tracer, View};
 
 fn sun_is_hidden(tracer: &Tracer<'_>, surface: &Surface, travel: DVec3) -> bool {
     tracer.occluded_from(surface, -travel, f64::INFINITY)
@@ -304,7 +304,7 @@ fn pictures_come_in_bands_and_the_same_on_any_number_of_threads() {
     assert_eq!(samples.len(), 60 * 40 * 9);
     // The same in pieces, with a last one that hangs over the picture's edge.
     let pieces = [0..7, 7..33, 33..99].map(|rows| view.band(rows, &nobody));
-    assert_eq!(pieces.iter().flat_map(|b| b.samples()).copied().collect::<Vec<_>>(), samples);
+    assert_eq!(pieces.iter().flat_map(Band::samples).copied().collect::<Vec<_>>(), samples);
     // Bands cover every row once, however large the picture.
     let wide = common::camera(DVec3::Z, DVec3::ZERO, [65536, 999]);
     let view = View::new(&tracer, wide, light, 64).unwrap();
