@@ -72,13 +72,15 @@ pub(crate) struct Local {
     pub grad_t: DVec3,
     /// d row / d t of the map's rows here.
     pub row_derivative: f64,
+    /// Growth of depth along the beam, 1/m.
+    pub depth_per_metre: f64,
 }
 
 impl Local {
     /// `p` in local space. `None` where the map does not apply.
     pub(crate) fn at(map: &ShadowMap, p: DVec3) -> Option<Self> {
         let m = map.shadow_from_local;
-        let [s, t, w] = [0, 1, 3].map(|i| m.row(i));
+        let [s, t, depth, w] = [0, 1, 2, 3].map(|i| m.row(i));
         let h = p.extend(1.0);
         let h_w = w.dot(h);
         if h_w <= 0.0 {
@@ -87,12 +89,14 @@ impl Local {
         let t_value = t.dot(h) / h_w;
         let gradient = |row: DVec4, value: f64| (row.xyz() - w.xyz() * value) / h_w;
         let row_derivative = map.rows.row_derivative(t_value);
+        let beam = map.beam_direction(p)?;
         Some(Self {
             w: h_w,
-            beam: map.beam_direction(p)?,
+            beam,
             grad_s: gradient(s, s.dot(h) / h_w) * f64::from(map.resolution[0]),
             grad_t: gradient(t, t_value) * (f64::from(map.resolution[1]) * row_derivative),
             row_derivative,
+            depth_per_metre: gradient(depth, depth.dot(h) / h_w).dot(beam),
         })
     }
 

@@ -1,3 +1,4 @@
+use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
 use crate::camera::Camera;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
@@ -133,6 +134,9 @@ pub struct Receiver {
     /// Slope of the surface's plane in shadow space, ∂depth/∂(s, t). Perspective maps take planes to
     /// planes, so this holds on the whole plane. Infinite where the surface is edge-on to the light.
     pub slope: DVec2,
+    /// What half a texel is worth in depth: half of the longest way across its
+    /// [footprint](crate::aliasing::Footprint), laid along the beam.
+    pub half_texel: f64,
 }
 
 impl ShadowMap {
@@ -176,11 +180,12 @@ impl ShadowMap {
     }
 
     /// A surface point with its plane, as the map sees it. `world_normal` need not have unit length
-    /// and may point to either side. `None` as for [`project`](Self::project).
+    /// and may point to either side. `None` as for [`project`](Self::project), and on empty maps.
     pub fn receiver(&self, world_position: DVec3, world_normal: DVec3) -> Option<Receiver> {
+        let local = world_position - self.origin;
+        let jacobian = (!self.is_empty()).then(|| Local::at(self, local))??;
         let p = self.project(world_position)?;
         // In shadow space the plane's covector is the world's times the inverse matrix.
-        let local = world_position - self.origin;
         let plane = world_normal.extend(-world_normal.dot(local));
         let shadow_plane = self.local_from_shadow.transpose() * plane;
         let slope = -shadow_plane.xy() / shadow_plane.z;
@@ -188,6 +193,7 @@ impl ShadowMap {
             st: p.truncate(),
             depth: p.z,
             slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
+            half_texel: 0.5 * jacobian.footprint().longest() * jacobian.depth_per_metre,
         })
     }
 

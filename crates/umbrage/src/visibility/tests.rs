@@ -22,7 +22,7 @@ fn map(resolution: [u32; 2], rows: Rows) -> ShadowMap {
 }
 
 fn flat(s: f64, t: f64, depth: f64) -> Receiver {
-    Receiver { st: DVec2::new(s, t), depth, slope: DVec2::ZERO }
+    Receiver { st: DVec2::new(s, t), depth, slope: DVec2::ZERO, half_texel: 0.0 }
 }
 
 fn filters() -> impl Iterator<Item = Filter> {
@@ -96,7 +96,7 @@ proptest! {
         let slope = DVec2::from_angle(azimuth) / elevation.tan();
         for rows in [Rows::Even, Rows::Logarithmic { ratio }] {
             let map = map([37, 23], rows);
-            let receiver = Receiver { st: DVec2::new(s, t), depth: 0.4, slope };
+            let receiver = Receiver { st: DVec2::new(s, t), depth: 0.4, slope, half_texel: 0.0 };
             let stored = |i: i32, j: i32| {
                 let row = (f64::from(j) + 0.5) / 23.0;
                 let center = DVec2::new((f64::from(i) + 0.5) / 37.0, rows.t_from_row(row));
@@ -110,7 +110,7 @@ proptest! {
 
     #[test]
     fn no_input_makes_a_nan(
-        s: f64, t: f64, depth: f64, ds: f64, dt: f64, stored in 0.0f32..=1.0,
+        s: f64, t: f64, depth: f64, ds: f64, dt: f64, half_texel: f64, stored in 0.0f32..=1.0,
     ) {
         for (st, slope) in [
             (DVec2::new(s, t), DVec2::new(ds, dt)),
@@ -120,7 +120,7 @@ proptest! {
             (DVec2::NAN, DVec2::NAN),
         ] {
             for filter in filters() {
-                let receiver = Receiver { st, depth, slope };
+                let receiver = Receiver { st, depth, slope, half_texel };
                 let v = visibility(&map([3, 3], Rows::Even), filter, &receiver, |_, _| stored);
                 prop_assert!((0.0..=1.0).contains(&v), "{v}");
             }
