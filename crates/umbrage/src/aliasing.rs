@@ -7,6 +7,7 @@
 //! [`ShadowMap::surface_error`] also has the second factor, *projection* error, exactly.
 
 use crate::camera::Camera;
+use crate::math::largest_stretch;
 use crate::plan::ShadowMap;
 use glam::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
 
@@ -33,9 +34,11 @@ impl Footprint {
 
     /// Largest singular value: how far the texel reaches per unit step in the worst direction, metres.
     pub fn longest(&self) -> f64 {
-        let (s, t) = (self.per_s.length_squared(), self.per_t.length_squared());
-        let mixed = self.per_s.dot(self.per_t);
-        (s.midpoint(t) + DVec2::new((s - t) / 2.0, mixed).length()).sqrt()
+        largest_stretch(
+            self.per_s.length_squared(),
+            self.per_t.length_squared(),
+            self.per_s.dot(self.per_t),
+        )
     }
 }
 
@@ -167,9 +170,11 @@ impl ShadowMap {
             DVec2::new(-texels.y_axis.x, texels.x_axis.x),
         );
         let m = pixels * adjugate;
-        let (a, b) = (m.x_axis.length_squared(), m.y_axis.length_squared());
-        let mixed = m.x_axis.dot(m.y_axis);
-        let larger = (a.midpoint(b) + DVec2::new((a - b) / 2.0, mixed).length()).sqrt();
+        let larger = largest_stretch(
+            m.x_axis.length_squared(),
+            m.y_axis.length_squared(),
+            m.x_axis.dot(m.y_axis),
+        );
         let smaller = if larger > 0.0 { m.determinant().abs() / larger } else { 0.0 };
         Some(SurfaceError { worst: larger / det.abs(), best: smaller / det.abs() })
     }

@@ -79,6 +79,8 @@ pub struct Bounds {
     /// Everything that receives shadows; `None` if unknown: the whole view frustum is served.
     pub receivers: Option<Aabb>,
     /// Everything that casts shadows; `None` if unknown: casters may lie anywhere towards the light.
+    /// Only [`Warp::Unfocused`](crate::Warp::Unfocused) has to cover it. Other maps need not: what lies
+    /// between the receivers and the light is clamped to depth 0.
     pub casters: Option<Aabb>,
 }
 

@@ -32,7 +32,7 @@ pub struct LookAt {
     pub up: DVec3,
     /// Vertical field of view, radians, in (0, π).
     pub fov_y_rad: f64,
-    /// Distance at which the view begins, > 0.
+    /// Distance at which the view begins, ≥ 1e-9.
     pub near: f64,
     /// Distance at which shadows end, > `near`.
     pub far: f64,
@@ -148,7 +148,11 @@ impl Camera {
         };
         let [a, b] = [distance_of(low), distance_of(1.0)];
         // An infinite far plane comes out as ±∞, or as a huge distance of either sign by rounding.
-        let finite = |d: f64| d > 0.0 && d < 1e12;
+        let huge = 1e9 * a.abs().min(b.abs());
+        check([a, b].iter().all(|&d| d > 0.0 || d < -huge), PROJECTION, || {
+            format!("has its near and far plane at {a} and {b}, not both before the viewer")
+        })?;
+        let finite = |d: f64| d > 0.0 && d < huge.min(1e12);
         let (near, far) = match (finite(a), finite(b)) {
             (true, true) => (a.min(b), a.max(b)),
             (true, false) => (a, f64::INFINITY),
@@ -197,8 +201,8 @@ impl Camera {
     }
 
     fn checked(self) -> Result<Self, Error> {
-        check(self.near > 0.0 && self.near.is_finite(), "camera.near", || {
-            format!("must be positive and finite, is {}", self.near)
+        check(self.near >= 1e-9 && self.near.is_finite(), "camera.near", || {
+            format!("must be finite and at least 1e-9, is {}", self.near)
         })?;
         check(self.far > self.near && self.far <= 1e12, "camera.far", || {
             format!("must exceed camera.near ({}) and be at most 1e12, is {}", self.near, self.far)

@@ -2,6 +2,7 @@
 
 use crate::bounds::{Aabb, Plane};
 use crate::camera::Camera;
+use crate::math::range;
 use glam::DVec3;
 
 /// A convex polyhedron as vertices and faces, cut down by planes. Its buffers are kept from frame
@@ -71,6 +72,11 @@ impl ConvexBody {
         &self.vertices
     }
 
+    /// Largest coordinate of any vertex, metres: how far from the eye digits have to reach.
+    pub(crate) fn size(&self) -> f64 {
+        range(self.vertices.iter().map(|v| v.abs().max_element())).1.max(0.0)
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.vertices.is_empty()
     }
@@ -113,8 +119,9 @@ impl ConvexBody {
             return;
         }
         // A flat box, a ground plane say, gets a thickness far below what single precision
-        // resolves, so that the body keeps an inside.
-        let pad = 1e-7 * self.vertices.iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        // resolves at its distance, so that the body keeps an inside.
+        let farthest = aabb.min.abs().max(aabb.max.abs()).max_element();
+        let pad = 1e-7 * farthest.min(self.size());
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
             self.clip(Plane { normal: axis, offset: pad - axis.dot(aabb.min) });
             self.clip(Plane { normal: -axis, offset: pad + axis.dot(aabb.max) });
@@ -123,7 +130,7 @@ impl ConvexBody {
 
     /// Cuts off what lies outside `plane`.
     pub(crate) fn clip(&mut self, plane: Plane) {
-        let scale = self.vertices.iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
+        let scale = self.size();
         // Vertices this close to the plane count as on it: no slivers below rounding.
         let tolerance = 1e-13 * scale.max(plane.offset.abs());
         let Scratch { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =

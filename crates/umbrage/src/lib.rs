@@ -30,9 +30,12 @@
 pub mod aliasing;
 mod bounds;
 mod camera;
+mod casters;
 mod error;
+mod fit;
 mod focus;
 mod light;
+mod math;
 mod options;
 mod plan;
 mod planner;

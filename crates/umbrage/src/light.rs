@@ -1,5 +1,6 @@
 use crate::bounds::Plane;
 use crate::error::{Error, check, check_position, unit};
+use crate::math::perpendicular_pair;
 use glam::DVec3;
 
 /// A light that casts shadows.
@@ -23,7 +24,7 @@ pub struct SpotLight {
     pub direction: DVec3,
     /// Half the cone's opening angle, radians, in (0, 85°]. Nothing outside is lit.
     pub half_angle_rad: f64,
-    /// Distance from the light, measured along the axis, at which shadows begin, metres, > 0.
+    /// Distance from the light, measured along the axis, at which shadows begin, metres, ≥ 1e-9.
     /// Receivers nearer than this get no shadow; casters nearer than this cast onto those beyond.
     pub near: f64,
     /// Distance along the axis at which light ends, metres, > `near`.
@@ -35,7 +36,7 @@ impl SpotLight {
     /// light's direction must have unit length.
     pub(crate) fn corners(&self, origin: DVec3) -> [DVec3; 8] {
         let apex = self.position - origin;
-        let (a, b) = self.direction.any_orthonormal_pair();
+        let (a, b) = perpendicular_pair(self.direction).into();
         let slope = self.half_angle_rad.tan();
         std::array::from_fn(|i| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
@@ -64,7 +65,7 @@ impl Light {
         let apex = spot.position - origin;
         let axis = spot.direction;
         let (sin, cos) = spot.half_angle_rad.sin_cos();
-        let (a, b) = axis.any_orthonormal_pair();
+        let (a, b) = perpendicular_pair(axis).into();
         let side = |d: DVec3| Plane::through(apex, axis * sin + d * cos);
         Some([
             side(a),
@@ -90,8 +91,8 @@ impl Light {
                     "light.half_angle_rad",
                     || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
                 )?;
-                check(spot.near > 0.0 && spot.near.is_finite(), "light.near", || {
-                    format!("must be positive and finite, is {}", spot.near)
+                check(spot.near >= 1e-9 && spot.near.is_finite(), "light.near", || {
+                    format!("must be finite and at least 1e-9, is {}", spot.near)
                 })?;
                 check(spot.range > spot.near && spot.range <= 1e12, "light.range", || {
                     format!(

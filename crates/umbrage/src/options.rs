@@ -26,7 +26,9 @@ impl Default for Options {
 ///
 /// All but `Unfocused`, `Uniform` and `Psm` are one-point perspectives along light space's z axis and
 /// differ in λ alone, the distance from the centre of projection to the near plane. All but
-/// `Unfocused` and `Lambda` become `Uniform` smoothly as the view turns into the light.
+/// `Unfocused` and `Lambda` become `Uniform` smoothly as the view turns into the light. Along the light
+/// itself z has no direction to follow: as the view sweeps past, the map turns half around within
+/// the angle by which it misses, `Uniform`'s too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warp {
@@ -38,6 +40,7 @@ pub enum Warp {
     /// Perspective shadow maps (Stamminger and Drettakis 2002): the map looks from the light at the
     /// world as it is after the viewer's own perspective. The depth stored is the light's own,
     /// so casters behind the eye need no moving back of the viewer.
+    /// Where a spot light stands among what is seen so that no perspective shows all of it, `Uniform`.
     Psm,
     /// Light space perspective shadow maps (Wimmer et al. 2004): λ = (n + √(n f))/sin θ, with f drawn
     /// in to n + μ sin θ where the tilt shrinks the warp's range (§4.4). n and f are the nearest and
@@ -49,7 +52,9 @@ pub enum Warp {
         /// Metres along the view, > 0; `None`: √(n f) of the receivers seen.
         focus: Option<f64>,
     },
-    /// The λ of least error, measured over the receivers seen; never worse than `Uniform`.
+    /// The λ of least error, measured over the receivers seen; never worse than `Uniform` (under spot
+    /// lights, with [`Objective::Area`]: by no more than one per cent). Where sin θ < sin φ/4 it fades
+    /// out.
     Adaptive(Objective),
     /// Logarithmic rows behind the λ = n/sin θ perspective: the unreachable optimum. Only the CPU
     /// reference can render it.

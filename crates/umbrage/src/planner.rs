@@ -1,15 +1,18 @@
 use crate::aliasing::Local;
-use crate::bounds::{Aabb, Bounds, Plane};
+use crate::bounds::{Aabb, Bounds};
 use crate::camera::Camera;
+use crate::casters::caster_planes;
 use crate::error::Error;
+use crate::fit::{fit, lambda, matrices};
 use crate::focus::ConvexBody;
 use crate::light::Light;
+use crate::math::range;
 use crate::options::{Objective, Options, Warp};
 use crate::plan::{MapError, Plan, Rows, ShadowMap};
 use crate::resolution::resolution;
 use crate::warp::{LightSpace, OnePoint, Seen, psm};
 use crate::worst::{self, worst_errors};
-use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// Plans shadow maps. Keep one per view: its buffers are reused, so that planning allocates nothing
 /// once they have grown.
@@ -17,11 +20,7 @@ use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 pub struct Planner {
     plan: Plan,
     body: ConvexBody,
-    seen: Vec<Seen>,
-    /// What `unfocused` covers: corners of the bounds, as seen from the light.
-    covered: Vec<Seen>,
-    outline: Vec<DVec2>,
-    worst: worst::Scratch,
+    scratch: Scratch,
 }
 
 impl Planner {
@@ -45,98 +44,120 @@ impl Planner {
     ) -> Result<&Plan, Error> {
         options.check()?;
         bounds.check()?;
-        let light = light.checked()?;
-        self.focus(camera, &light, bounds);
-        let middle = Aabb::around(self.body.vertices().iter().copied()).center();
-        let space = match options.warp {
-            Warp::Unfocused => LightSpace::fixed(&light, camera),
-            _ => LightSpace::following_view(&light, camera, middle),
+        let request = Request { camera, light: &light.checked()?, bounds, options };
+        let Self { plan, body, scratch } = self;
+        request.focus(body);
+        plan.origin = camera.eye();
+        plan.maps.resize_with(1, || ShadowMap::empty(camera));
+        let map = &mut plan.maps[0];
+        map.clear(camera);
+        let middle = if body.is_empty() {
+            camera.forward() * camera.near()
+        } else {
+            Aabb::around(body.vertices().iter().copied()).center()
         };
-        let theta_rad = match options.warp {
-            Warp::Unfocused if !self.body.is_empty() => {
-                LightSpace::following_view(&light, camera, middle).theta_rad
-            }
-            _ => space.theta_rad,
-        };
-        self.plan.origin = camera.eye();
-        self.plan.theta_rad = if theta_rad.is_finite() { theta_rad } else { 0.0 };
-        self.plan.maps.resize_with(1, || ShadowMap::empty(camera));
-        let mut map = self.plan.maps.swap_remove(0);
-        self.plan_map(&mut map, camera, &space, &light, bounds, options);
-        self.plan.maps.push(map);
+        let space = LightSpace::following_view(request.light, camera, middle);
+        plan.theta_rad = space.theta_rad;
+        if !body.is_empty() {
+            scratch.plan_map(map, body, &space, &request);
+        }
         Ok(&self.plan)
     }
+}
 
+/// Checked input.
+struct Request<'a> {
+    camera: &'a Camera,
+    light: &'a Light,
+    bounds: &'a Bounds,
+    options: &'a Options,
+}
+
+impl Request<'_> {
     /// Sets `body` to what the camera sees of the receivers, in the light.
-    fn focus(&mut self, camera: &Camera, light: &Light, bounds: &Bounds) {
-        self.body.set_frustum(camera);
-        if let Some(receivers) = bounds.receivers {
-            self.body.clip_aabb(receivers.relative_to(camera.eye()));
+    fn focus(&self, body: &mut ConvexBody) {
+        body.set_frustum(self.camera);
+        if let Some(receivers) = self.bounds.receivers {
+            body.clip_aabb(receivers.relative_to(self.camera.eye()));
         }
-        for plane in light.frustum(camera.eye()).into_iter().flatten() {
-            self.body.clip(plane);
+        for plane in self.light.frustum(self.camera.eye()).into_iter().flatten() {
+            body.clip(plane);
         }
     }
 
+    /// Corners of all that `unfocused` covers, in local space.
+    fn whole_scene(&self, space: &LightSpace) -> [DVec3; 8] {
+        let eye = self.camera.eye();
+        let scene = self.bounds.receivers.map(|r| self.bounds.casters.map_or(r, |c| r.union(c)));
+        match (self.light, scene) {
+            (Light::Spot(spot), _) => spot.corners(eye),
+            (_, Some(scene)) => scene.relative_to(eye).corners(),
+            (_, None) => bounding_cube(self.camera, space),
+        }
+    }
+}
+
+/// Buffers kept from frame to frame.
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    seen: Vec<Seen>,
+    /// What `unfocused` covers, as seen from the light.
+    covered: Vec<Seen>,
+    outline: Vec<DVec2>,
+    worst: worst::Scratch,
+}
+
+impl Scratch {
     fn plan_map(
         &mut self,
         map: &mut ShadowMap,
-        camera: &Camera,
-        space: &LightSpace,
-        light: &Light,
-        bounds: &Bounds,
-        options: &Options,
+        body: &ConvexBody,
+        following_view: &LightSpace,
+        request: &Request<'_>,
     ) {
-        map.clear(camera);
-        if self.body.is_empty() {
-            return;
-        }
-        let seen = &mut self.seen;
+        let Request { camera, light, options, .. } = *request;
+        let is_unfocused = options.warp == Warp::Unfocused;
+        let space = &if is_unfocused { LightSpace::fixed(light, camera) } else { *following_view };
+        let Self { seen, covered, outline, worst } = self;
+        let see = |p: DVec3| Seen::new(p, space, camera);
         seen.clear();
-        seen.extend(self.body.vertices().iter().map(|&v| Seen::new(v, space, camera)));
-        caster_planes(&mut map.caster_planes, &self.body, seen, space, &mut self.outline);
+        seen.extend(body.vertices().iter().map(|&v| see(v)));
+        caster_planes(&mut map.caster_planes, body, seen, space, outline);
         if space.apex.is_some() {
             // Under a spot light errors need not be largest at corners. These are points enough to
             // choose a warp by; the errors reported do not depend on them.
-            let vertices = self.body.vertices();
-            seen.extend(self.body.edges().flat_map(|[a, b]| {
-                [0.25, 0.5, 0.75]
-                    .map(|k| Seen::new(vertices[a].lerp(vertices[b], k), space, camera))
+            let vertices = body.vertices();
+            seen.extend(body.edges().flat_map(|[a, b]| {
+                [0.25, 0.5, 0.75].map(|k| see(vertices[a].lerp(vertices[b], k)))
             }));
         }
-
-        // What the map has to cover is what is seen, but for `unfocused`.
-        let covered: &[Seen] = if options.warp == Warp::Unfocused {
-            self.covered.clear();
-            let cover = |p: DVec3| Seen::new(p, space, camera);
-            let scene = bounds.receivers.map(|r| bounds.casters.map_or(r, |c| r.union(c)));
-            self.covered.extend(match (light, scene) {
-                (Light::Spot(spot), _) => spot.corners(camera.eye()).map(cover),
-                (_, Some(scene)) => scene.relative_to(camera.eye()).corners().map(cover),
-                (_, None) => bounding_cube(camera, space).map(cover),
-            });
-            // What is seen as well: its bounds were widened a little if they are flat.
-            self.covered.extend_from_slice(&self.seen);
-            &self.covered
+        let seen = &*seen;
+        // What the map has to cover is what is seen, but for `unfocused`. What is seen is covered
+        // there too: its bounds were widened a little if they are flat.
+        let covered: &[Seen] = if is_unfocused {
+            covered.clear();
+            covered.extend(request.whole_scene(space).map(see));
+            covered.extend_from_slice(seen);
+            covered
         } else {
-            &self.seen
+            seen
         };
 
         let family = OnePoint::around(covered, space);
         let unfitted = match options.warp {
-            Warp::Psm => psm(space, camera, self.body.vertices()),
+            Warp::Psm => psm(space, camera, body.vertices()),
             _ => None,
         };
         let mut finish = |map: &mut ShadowMap, homography: DMat3| {
             [map.shadow_from_local, map.local_from_shadow] = matrices(homography, covered, space);
             map.apex = space.apex;
-            map.lambda = lambda(homography, &self.seen);
-            map.split = depth_range(&self.seen);
+            map.lambda = lambda(homography, seen);
+            map.split = range(seen.iter().map(|p| p.depth)).into();
             // Errors at one texel decide the resolution.
             map.resolution = [1, 1];
-            let [unit_s, unit_t] = unit_errors(map, &self.body, camera);
+            let [unit_s, unit_t] = unit_errors(map, body, camera);
             map.resolution = resolution(options, unit_s, unit_t);
-            map.error = worst_errors(map, &self.body, camera, &mut self.worst);
+            map.error = worst_errors(map, body, camera, worst);
             let height = f64::from(camera.image()[1]);
             map.storage_factor =
                 map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
@@ -187,92 +208,6 @@ impl ShadowMap {
     }
 }
 
-/// Scales and moves a homography's s and t so that what is seen fills [0, 1]², and w so that its
-/// least value is 1.
-fn fit(homography: DMat3, seen: &[Seen]) -> DMat3 {
-    let [s, t, w] = [0, 1, 2].map(|i| homography.row(i));
-    let range = |row: DVec3| {
-        seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-            let h = p.xz.extend(1.0);
-            let v = row.dot(h) / w.dot(h);
-            (lo.min(v), hi.max(v))
-        })
-    };
-    let least_w = seen.iter().map(|p| w.dot(p.xz.extend(1.0))).fold(f64::INFINITY, f64::min);
-    let fit = |row: DVec3| {
-        let (lo, hi) = range(row);
-        (row - w * lo) / ((hi - lo).max(1e-12 * hi.abs().max(lo.abs())) * least_w)
-    };
-    DMat3::from_cols(fit(s), fit(t), w / least_w).transpose()
-}
-
-/// The whole transform from local to shadow space: the homography for s, t and w, and a depth that
-/// grows linearly away from the light, divided by w, with 0 and 1 at the ends of what is covered. And
-/// its inverse.
-fn matrices(homography: DMat3, covered: &[Seen], space: &LightSpace) -> [DMat4; 2] {
-    let w = homography.row(2);
-    let range = |f: &dyn Fn(&Seen) -> f64| {
-        covered
-            .iter()
-            .map(f)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
-    };
-    let (y0, y1) = range(&|p| p.y);
-    // y counts from the middle of its range (Wimmer et al. 2004, §3.4), which keeps the perspective from
-    // tilting depth.
-    let middle = y0.midpoint(y1);
-    let depth = |p: &Seen| (middle - p.y) / w.dot(p.xz.extend(1.0));
-    let (nearest, farthest) = range(&depth);
-    // A flat body across the light has no range of depth. Give it one that single precision can
-    // work with.
-    let span =
-        (farthest - nearest).max(1e-3 * light_plane_extent(covered) * depth_unit(covered, space));
-    let nearest = nearest.midpoint(farthest) - span / 2.0;
-    // Numerators over (x, y, z, w) of light space.
-    let on_plane = |row: DVec3| DVec4::new(row.x, 0.0, row.y, row.z);
-    let rows = [0, 1, 2].map(|i| on_plane(homography.row(i)));
-    let depth_row = (DVec4::new(0.0, -1.0, 0.0, middle) - rows[2] * nearest) / span;
-    let shadow_from_light = DMat4::from_cols(rows[0], rows[1], depth_row, rows[2]).transpose();
-    // Inverted piece by piece, which keeps the digits that a general inverse loses where near and far
-    // are orders of magnitude apart: y follows from depth and the rest.
-    let inverse = homography.inverse();
-    let [x, z, w] = [0, 1, 2].map(|i| inverse.row(i)).map(|r| DVec4::new(r.x, r.y, 0.0, r.z));
-    let y = w * middle - DVec4::new(0.0, 0.0, span, nearest);
-    let light_from_shadow = DMat4::from_cols(x, y, z, w).transpose();
-    [shadow_from_light * space.light_from_local(), space.local_from_light() * light_from_shadow]
-}
-
-fn light_plane_extent(covered: &[Seen]) -> f64 {
-    let (lo, hi) = covered
-        .iter()
-        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| (lo.min(p.xz), hi.max(p.xz)));
-    (hi - lo).max_element()
-}
-
-/// What a unit of light-space x is worth in light-space y: y is 1/distance for a spot light.
-fn depth_unit(covered: &[Seen], space: &LightSpace) -> f64 {
-    match space.apex {
-        None => 1.0,
-        Some(_) => covered.iter().map(|p| p.y).fold(0.0, f64::max),
-    }
-}
-
-/// Distance from the line on which a homography's w vanishes to what is seen: λ. `None` if w
-/// does not vary.
-fn lambda(homography: DMat3, seen: &[Seen]) -> Option<f64> {
-    let w = homography.row(2);
-    let (lo, hi) = seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-        let v = w.dot(p.xz.extend(1.0));
-        (lo.min(v), hi.max(v))
-    });
-    (hi > lo * (1.0 + 1e-9)).then(|| lo / w.truncate().length())
-}
-
-fn depth_range(seen: &[Seen]) -> [f64; 2] {
-    seen.iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], p| [lo.min(p.depth), hi.max(p.depth)])
-}
-
 /// Largest m_s and m_t of a map at the body's vertices.
 fn unit_errors(map: &ShadowMap, body: &ConvexBody, camera: &Camera) -> [f64; 2] {
     body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
@@ -299,73 +234,4 @@ fn bounding_cube(camera: &Camera, space: &LightSpace) -> [DVec3; 8] {
         let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
         center + axes[0] * sign(0) + axes[1] * sign(1) + axes[2] * sign(2)
     })
-}
-
-/// Planes around all that can cast onto `body`: the body swept towards the light. Those of its
-/// faces that look away from the light, and one through every edge of its outline seen from the
-/// light.
-fn caster_planes(
-    planes: &mut Vec<Plane>,
-    body: &ConvexBody,
-    seen: &[Seen],
-    space: &LightSpace,
-    outline: &mut Vec<DVec2>,
-) {
-    let size = body.vertices().iter().fold(0.0, |m: f64, v| m.max(v.abs().max_element()));
-    // Rounding must never lose a caster.
-    let slack = 1e-9 * size;
-    let sweeps_inwards = |plane: &Plane| match space.apex {
-        None => plane.normal.dot(space.y.truncate()) >= 0.0,
-        Some(apex) => plane.distance(apex) >= 0.0,
-    };
-    let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
-    planes.extend(body.planes().filter(sweeps_inwards).map(widen));
-    convex_outline(outline, seen.iter().map(|p| p.xz));
-    for (i, &a) in outline.iter().enumerate() {
-        let b = outline[(i + 1) % outline.len()];
-        // The line through a and b in the light plane, as a covector over (x, z, w) of light space,
-        // positive to the left of a → b: inside.
-        let line = DVec3::new(a.y - b.y, b.x - a.x, a.x * b.y - b.x * a.y);
-        let plane = space.x * line.x + space.z * line.y + space.w * line.z;
-        let length = plane.truncate().length();
-        if length > 0.0 {
-            let plane = plane / length;
-            let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
-            // An edge as short as rounding may point anywhere: better no plane than a wrong one.
-            if body.vertices().iter().all(|&v| plane.distance(v) >= 0.0) {
-                planes.push(plane);
-            }
-        }
-    }
-}
-
-/// The convex hull of points in the plane, counter-clockwise (Andrew's monotone chain).
-fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
-    hull.clear();
-    hull.extend(points);
-    hull.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    hull.dedup();
-    if hull.len() < 3 {
-        return;
-    }
-    // The chain is built behind the sorted points, which then go.
-    let n = hull.len();
-    let mut chain = |indices: &mut dyn Iterator<Item = usize>| {
-        let start = hull.len();
-        for i in indices {
-            let p = hull[i];
-            while hull.len() >= start + 2 {
-                let [a, b] = [hull[hull.len() - 2], hull[hull.len() - 1]];
-                if (b - a).perp_dot(p - a) > 0.0 {
-                    break;
-                }
-                hull.pop();
-            }
-            hull.push(p);
-        }
-        hull.pop();
-    };
-    chain(&mut (0..n));
-    chain(&mut (0..n).rev());
-    hull.drain(..n);
 }

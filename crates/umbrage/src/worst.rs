@@ -23,8 +23,8 @@ use std::collections::BinaryHeap;
 
 /// The reported maximum may exceed the true one by this share.
 const TOLERANCE: f64 = 0.01;
-/// Halvings after which the bounds that are left are taken as they are. Views of some ten orders of
-/// magnitude between near and far get there; others need dozens.
+/// Halvings after which the bounds that are left are taken as they are. Parallel light needs dozens;
+/// spot lights near what they shine on, and views of many orders of magnitude, get here.
 const MAX_SPLITS: usize = 1000;
 
 /// Values at a corner of a simplex.
@@ -96,8 +96,7 @@ pub(crate) fn worst_errors(
     open.clear();
     let best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
     let mut search = Search { probe, corners, open, best, settled: best };
-    // A corner that the map does not reach would be a fault of the fit.
-    debug_assert_eq!(search.corners.len(), body.vertices().len());
+    // Bodies smaller than rounding at their distance have corners that the map does not reach.
     if search.corners.len() == body.vertices().len() {
         if search.probe.edges_suffice() {
             body.edges().for_each(|[a, b]| search.add([a, b, b].map(|i| i as u32)));
@@ -112,7 +111,10 @@ pub(crate) fn worst_errors(
             }
         }
     }
-    let bounds = search.open.iter().fold(search.settled, |bounds, s| larger(bounds, s.bound));
+    // What is still open counts with its bound, where there is one.
+    let bounds = search.open.iter().fold(search.settled, |bounds, s| {
+        larger(bounds, s.bound.map(|b| if b.is_finite() { b } else { 0.0 }))
+    });
     let pixel = camera.pixel_width_per_depth();
     let [max_s, max_t, max] = larger(search.best, bounds).map(|e| e / pixel);
     MapError { max_s, max_t, max }
@@ -233,12 +235,18 @@ impl Probe<'_> {
                 (w_over_z * affine).min(max(&|c| c.w) * over_z)
             }
             Some(apex) => {
+                // ‖A‖/z = w ‖r × K‖/(|r| z), and |r| is at least its share along a fixed direction. That
+                // share may go with w or with ‖r × K‖.
                 let middle = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
-                let share = max(&|c| {
-                    let along = (c.p - apex).dot(middle);
-                    if along > 0.0 { c.w / along } else { f64::INFINITY }
-                });
-                share * max(&|c| c.errors[i] * c.r / c.w)
+                let per_share = |value: &dyn Fn(&Corner) -> f64| {
+                    max(&|c| {
+                        let share = (c.p - apex).dot(middle);
+                        if share > 0.0 { value(c) / share } else { f64::INFINITY }
+                    })
+                };
+                let with_w = per_share(&|c| c.w) * max(&|c| c.errors[i] * c.r / c.w);
+                let with_norm = w_over_z * per_share(&|c| c.errors[i] * c.z * c.r / c.w);
+                with_w.min(with_norm)
             }
         };
         [norm(0), t, norm(2) * spread]

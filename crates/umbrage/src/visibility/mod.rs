@@ -39,7 +39,7 @@ pub enum Filter {
     /// that it covers, so (n + 1)² of them are compared, which is what n × n bilinear comparisons of
     /// a GPU see.
     Pcf {
-        /// Width of the box, texels, 1 to [`MAX_PCF`](Self::MAX_PCF), even or odd.
+        /// Width of the box, texels, even or odd; clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
     },
 }
@@ -63,7 +63,7 @@ impl Filter {
     pub fn reach_texels(self) -> u32 {
         match self {
             Self::Hard => 0,
-            Self::Pcf { n } => n / 2 + 1,
+            Self::Pcf { n } => n.clamp(1, Self::MAX_PCF) / 2 + 1,
         }
     }
 }
@@ -109,6 +109,7 @@ pub fn visibility(
             f32::from(u8::from(is_lit(i as i32, j as i32)))
         }
         Filter::Pcf { n } => {
+            let n = n.clamp(1, Filter::MAX_PCF);
             let columns = Span::new(texel.x, n);
             let rows = Span::new(texel.y, n);
             let row_sum = |j| columns.sum(|i| f64::from(u8::from(is_lit(i, j))));
@@ -131,8 +132,7 @@ impl<'a> Test<'a> {
         Self { map, receiver, slack: receiver.half_texel + rounding }
     }
 
-    /// The depth from which on texel (i, j) does not hide the receiver. An edge-on receiver, of
-    /// infinite slope, is not hidden by anything.
+    /// The depth from which on texel (i, j) does not hide the receiver.
     fn nearest_lit(&self, i: i32, j: i32) -> f64 {
         let [width, height] = self.map.resolution.map(f64::from);
         let center = DVec2::new(
@@ -140,7 +140,7 @@ impl<'a> Test<'a> {
             self.map.rows.t_from_row((f64::from(j) + 0.5) / height),
         );
         let depth = self.receiver.depth;
-        // An infinite slope makes the rise infinite or NaN, which `min` ignores, but also the slack.
+        // An edge-on receiver's infinite slope makes the rise infinite or NaN. `min` ignores NaN.
         let rise = self.receiver.slope.dot(center - self.receiver.st);
         // Depths end at 1: what is stored as 1 may lie anywhere behind.
         depth.min(depth + rise).min(1.0) - self.slack

@@ -1,5 +1,6 @@
 use crate::camera::Camera;
 use crate::light::Light;
+use crate::math::perpendicular_pair;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// Light space (Wimmer et al. 2004, §3.4) over local space: for spot lights after the light's own
@@ -38,7 +39,7 @@ impl LightSpace {
         };
         let z = slope - direction * direction.dot(slope);
         let z_per_view_metre = z.length();
-        let theta_rad = beam.dot(view).clamp(-1.0, 1.0).acos();
+        let theta_rad = beam.cross(view).length().atan2(beam.dot(view));
         // Looking exactly along the light any z will do. Up in the picture is one that keeps
         // still while the viewer moves.
         let z =
@@ -54,7 +55,7 @@ impl LightSpace {
     /// Light space with an orientation that depends on the light alone.
     pub(crate) fn fixed(light: &Light, camera: &Camera) -> Self {
         let Base { direction, apex } = Base::of(light, camera);
-        let z = direction.any_orthonormal_vector();
+        let [_, z] = perpendicular_pair(direction);
         Self::new(direction, apex, z, 0.0, 0.0)
     }
 

@@ -9,8 +9,12 @@ pub(crate) use light_space::LightSpace;
 pub(crate) use psm::psm;
 
 use crate::camera::Camera;
+use crate::math::range;
 use crate::options::Warp;
 use glam::{DMat3, DVec2, DVec3};
+
+/// Strengths beyond this have no digits left.
+const MAX_STRENGTH: f64 = 1e9;
 
 /// A vertex of the body seen, as the light sees it.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +61,7 @@ pub(crate) struct OnePoint {
     z0: f64,
     /// Depth range μ, light-space units, > 0.
     mu: f64,
+    /// View distance of the nearest and the farthest point seen, metres.
     nearest: f64,
     farthest: f64,
 }
@@ -64,14 +69,9 @@ pub(crate) struct OnePoint {
 impl OnePoint {
     /// The family that fits the points seen.
     pub(crate) fn around(seen: &[Seen], space: &LightSpace) -> Self {
-        let range = |f: fn(&Seen) -> f64| {
-            seen.iter()
-                .map(f)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
-        };
-        let (x0, x1) = range(|p| p.xz.x);
-        let (z0, z1) = range(|p| p.xz.y);
-        let (nearest, farthest) = range(|p| p.depth);
+        let (x0, x1) = range(seen.iter().map(|p| p.xz.x));
+        let (z0, z1) = range(seen.iter().map(|p| p.xz.y));
+        let (nearest, farthest) = range(seen.iter().map(|p| p.depth));
         // The viewer is local space's origin. After a spot light's perspective he may lie at or
         // beyond infinity, so there the middle of what he sees stands in for him.
         let center_x = if space.apex.is_some() { x0.midpoint(x1) } else { 0.0 };
@@ -87,10 +87,7 @@ impl OnePoint {
 
     /// Range of x/w over the points seen.
     fn extent(&self, nu: f64, seen: &[Seen]) -> (f64, f64) {
-        seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), p| {
-            let x = (p.xz.x - self.center_x) / self.w(nu, p.xz.y);
-            (lo.min(x), hi.max(x))
-        })
+        range(seen.iter().map(|p| (p.xz.x - self.center_x) / self.w(nu, p.xz.y)))
     }
 
     /// The homography of strength ν, fitted to the points seen.
@@ -115,8 +112,15 @@ impl OnePoint {
     ) -> f64 {
         match warp {
             Warp::Unfocused | Warp::Uniform | Warp::Psm => 0.0,
-            Warp::Lambda(lambda) => self.mu / lambda,
-            Warp::Adaptive(objective) => least_error(self, seen, objective),
+            Warp::Lambda(lambda) => (self.mu / lambda).min(MAX_STRENGTH),
+            Warp::Adaptive(objective) => {
+                // As the view turns into the light z swings around, and what is best for one z is
+                // not for its opposite. The cost has one valley, so that less warp than the best is
+                // still better than none.
+                let phi = camera.tan_half_fov_y().atan();
+                let fade = (4.0 * space.theta_rad.sin() / phi.sin()).min(1.0);
+                least_error(self, seen, objective) * fade
+            }
             Warp::Lispsm => self.along_view(space, |view| {
                 let f = view.n + (view.f - view.n).min(view.mu_metres * view.sin_theta);
                 view.strength(view.n + (view.n * f).sqrt())

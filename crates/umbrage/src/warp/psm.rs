@@ -70,23 +70,72 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
     Some(DMat3::from_cols(s, t, w).transpose())
 }
 
-/// The direction that has all directions well in front of it: along the point nearest to the
-/// origin of their convex hull (Gilbert's algorithm). `None` if they do not fit into a half-space.
+/// Axis of the narrowest cone around all directions, which are unit vectors. `None` if it is not narrower
+/// than a half-space.
+///
+/// Grown one direction at a time, as Welzl (1991) grows smallest circles: one that sticks out lies
+/// on the border of the cone around it and those before, which one or two of these define with it.
 fn middle_of_cone(vertices: &[DVec3], direction: impl Fn(DVec3) -> DVec3) -> Option<DVec3> {
-    let mut x = direction(*vertices.first()?);
-    for _ in 0..200 {
-        let (support, least) = vertices
-            .iter()
-            .map(|&v| direction(v))
-            .map(|d| (d, d.dot(x)))
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let gap = x.length_squared() - least;
-        if gap <= 1e-12 * x.length_squared() {
-            break;
+    let sticks_out =
+        |d: DVec3, axis: DVec3, on_border: DVec3| d.dot(axis) < on_border.dot(axis) - 1e-14;
+    let at = |i: usize| direction(vertices[i]);
+    let (mut axis, mut border) = (direction(*vertices.first()?), direction(*vertices.first()?));
+    for i in 1..vertices.len() {
+        let a = at(i);
+        if !sticks_out(a, axis, border) {
+            continue;
         }
-        let step = x - support;
-        x -= step * (gap / step.length_squared()).min(1.0);
+        (axis, border) = (a, a);
+        for j in 0..i {
+            let b = at(j);
+            if !sticks_out(b, axis, border) {
+                continue;
+            }
+            axis = (a + b).try_normalize()?;
+            for k in 0..j {
+                let c = at(k);
+                if sticks_out(c, axis, border) {
+                    let normal = (b - a).cross(c - a).try_normalize()?;
+                    axis = if normal.dot(a) < 0.0 { -normal } else { normal };
+                }
+            }
+        }
     }
-    let axis = x.try_normalize()?;
-    vertices.iter().all(|&v| direction(v).dot(axis) > 1e-6).then_some(axis)
+    vertices.iter().all(|&v| direction(v).dot(axis) > 1e-9).then_some(axis)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// No axis of a fine grid gives a narrower cone.
+        #[test]
+        fn cones_are_narrowest(
+            points in proptest::collection::vec([-1.0..1.0f64, -1.0..1.0, 0.001..1.0], 1..20),
+        ) {
+            let directions: Vec<DVec3> = points.into_iter().map(|p| DVec3::from(p).normalize()).collect();
+            let narrowness = |axis: DVec3| {
+                directions.iter().map(|d| d.dot(axis)).fold(f64::INFINITY, f64::min)
+            };
+            let axis = middle_of_cone(&directions, |d| d).unwrap();
+            let found = narrowness(axis);
+            for i in 0..4000 {
+                // A spiral over the sphere.
+                let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 4000.0;
+                let (sin, cos) = (f64::from(i) * 2.399_963).sin_cos();
+                let r = (1.0 - y * y).sqrt();
+                prop_assert!(narrowness(DVec3::new(r * cos, y, r * sin)) <= found + 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn what_fills_a_half_space_has_no_cone() {
+        let around = [DVec3::X, DVec3::NEG_X, DVec3::Y];
+        assert_eq!(middle_of_cone(&around, |d| d), None);
+    }
 }

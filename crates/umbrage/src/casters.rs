@@ -1,0 +1,74 @@
+//! What can cast into a map.
+
+use crate::bounds::Plane;
+use crate::focus::ConvexBody;
+use crate::warp::{LightSpace, Seen};
+use glam::{DVec2, DVec3};
+
+/// Planes around all that can cast onto `body`: the body swept towards the light. Those of its
+/// faces that look away from the light, and one through every edge of its outline seen from the
+/// light.
+pub(crate) fn caster_planes(
+    planes: &mut Vec<Plane>,
+    body: &ConvexBody,
+    seen: &[Seen],
+    space: &LightSpace,
+    outline: &mut Vec<DVec2>,
+) {
+    // Rounding must never lose a caster.
+    let slack = 1e-9 * body.size();
+    let sweeps_inwards = |plane: &Plane| match space.apex {
+        None => plane.normal.dot(space.y.truncate()) >= 0.0,
+        Some(apex) => plane.distance(apex) >= 0.0,
+    };
+    let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
+    planes.extend(body.planes().filter(sweeps_inwards).map(widen));
+    convex_outline(outline, seen.iter().map(|p| p.xz));
+    for (i, &a) in outline.iter().enumerate() {
+        let b = outline[(i + 1) % outline.len()];
+        // The line through a and b in the light plane, as a covector over (x, z, w) of light space,
+        // positive to the left of a → b: inside.
+        let line = DVec3::new(a.y - b.y, b.x - a.x, a.x * b.y - b.x * a.y);
+        let plane = space.x * line.x + space.z * line.y + space.w * line.z;
+        let length = plane.truncate().length();
+        if length > 0.0 {
+            let plane = plane / length;
+            let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
+            // An edge as short as rounding may point anywhere: better no plane than a wrong one.
+            if body.vertices().iter().all(|&v| plane.distance(v) >= 0.0) {
+                planes.push(plane);
+            }
+        }
+    }
+}
+
+/// The convex hull of points in the plane, counter-clockwise (Andrew's monotone chain).
+fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
+    hull.clear();
+    hull.extend(points);
+    hull.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    hull.dedup();
+    if hull.len() < 3 {
+        return;
+    }
+    // The chain is built behind the sorted points, which then go.
+    let n = hull.len();
+    let mut chain = |indices: &mut dyn Iterator<Item = usize>| {
+        let start = hull.len();
+        for i in indices {
+            let p = hull[i];
+            while hull.len() >= start + 2 {
+                let [a, b] = [hull[hull.len() - 2], hull[hull.len() - 1]];
+                if (b - a).perp_dot(p - a) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        hull.pop();
+    };
+    chain(&mut (0..n));
+    chain(&mut (0..n).rev());
+    hull.drain(..n);
+}

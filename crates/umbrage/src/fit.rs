@@ -1,0 +1,61 @@
+//! From a homography of the light plane to a map's matrices.
+
+use crate::math::range;
+use crate::warp::{LightSpace, Seen};
+use glam::{DMat3, DMat4, DVec3, DVec4};
+
+/// Scales and moves a homography's s and t so that what is seen fills [0, 1]², and w so that its
+/// least value is 1.
+pub(crate) fn fit(homography: DMat3, seen: &[Seen]) -> DMat3 {
+    let [s, t, w] = [0, 1, 2].map(|i| homography.row(i));
+    let value = |row: DVec3, p: &Seen| row.dot(p.xz.extend(1.0));
+    let (least_w, _) = range(seen.iter().map(|p| value(w, p)));
+    let fit = |row: DVec3| {
+        let (lo, hi) = range(seen.iter().map(|p| value(row, p) / value(w, p)));
+        (row - w * lo) / ((hi - lo).max(1e-12 * hi.abs().max(lo.abs())) * least_w)
+    };
+    DMat3::from_cols(fit(s), fit(t), w / least_w).transpose()
+}
+
+/// The whole transform from local to shadow space: the homography for s, t and w, and a depth that
+/// grows linearly away from the light, divided by w, with 0 and 1 at the ends of what is covered. And
+/// its inverse.
+pub(crate) fn matrices(homography: DMat3, covered: &[Seen], space: &LightSpace) -> [DMat4; 2] {
+    let w = homography.row(2);
+    let (y0, y1) = range(covered.iter().map(|p| p.y));
+    // y counts from the middle of its range (Wimmer et al. 2004, §3.4), which keeps the perspective from
+    // tilting depth.
+    let middle = y0.midpoint(y1);
+    let depth = |p: &Seen| (middle - p.y) / w.dot(p.xz.extend(1.0));
+    let (nearest, farthest) = range(covered.iter().map(depth));
+    // A flat body across the light has no range of depth. Give it one that single precision can
+    // work with.
+    let [width, height] = [0, 1].map(|axis| {
+        let (lo, hi) = range(covered.iter().map(|p| p.xz[axis]));
+        hi - lo
+    });
+    // What a unit of x or z is worth in y, which is 1/distance for a spot light.
+    let unit = if space.apex.is_some() { y1 } else { 1.0 };
+    let span = (farthest - nearest).max(1e-3 * width.max(height) * unit);
+    let nearest = nearest.midpoint(farthest) - span / 2.0;
+    // Numerators over (x, y, z, w) of light space.
+    let on_plane = |row: DVec3| DVec4::new(row.x, 0.0, row.y, row.z);
+    let rows = [0, 1, 2].map(|i| on_plane(homography.row(i)));
+    let depth_row = (DVec4::new(0.0, -1.0, 0.0, middle) - rows[2] * nearest) / span;
+    let shadow_from_light = DMat4::from_cols(rows[0], rows[1], depth_row, rows[2]).transpose();
+    // Inverted piece by piece, which keeps the digits that a general inverse loses where near and far
+    // are orders of magnitude apart: y follows from depth and the rest.
+    let inverse = homography.inverse();
+    let [x, z, w] = [0, 1, 2].map(|i| inverse.row(i)).map(|r| DVec4::new(r.x, r.y, 0.0, r.z));
+    let y = w * middle - DVec4::new(0.0, 0.0, span, nearest);
+    let light_from_shadow = DMat4::from_cols(x, y, z, w).transpose();
+    [shadow_from_light * space.light_from_local(), space.local_from_light() * light_from_shadow]
+}
+
+/// Distance from the line on which a homography's w vanishes to what is seen: λ. `None` if w
+/// does not vary.
+pub(crate) fn lambda(homography: DMat3, seen: &[Seen]) -> Option<f64> {
+    let w = homography.row(2);
+    let (lo, hi) = range(seen.iter().map(|p| w.dot(p.xz.extend(1.0))));
+    (hi > lo * (1.0 + 1e-9)).then(|| lo / w.truncate().length())
+}
