@@ -257,3 +257,43 @@ fn warps_fade_as_the_view_turns_into_the_light() {
         }
     }
 }
+
+/// The forms as printed fail against the measured matrices, so that nobody "corrects" ours back to them.
+#[test]
+fn misprints_in_the_papers_fail() {
+    let off = |measured: f64, printed: f64| printed / measured;
+    // Lloyd et al. Eqs. 2 and 9 lose a factor n, which shows at n = 2.
+    let (n, f, lambda) = (2.0, 200.0, 30.0);
+    let wide = camera(n, f);
+    let map = &plan_view(&wide, std::f64::consts::FRAC_PI_2, Warp::Lambda(lambda)).maps[0];
+    let printed = f64::from(IMAGE) / f64::from(RES[0]) * f * lambda / (lambda + f - n);
+    assert_close(off(map.error.max_s, printed), n, 1e-6, "M_s as printed is n times too large");
+    let printed = 2.0 * 7.0 * PHI.tan() / (n * f64::from(IMAGE));
+    let measured = 7.0 * wide.pixel_width_per_depth();
+    assert_close(off(measured, printed), 1.0 / n, 1e-9, "w_i as printed is 1/n of a pixel's width");
+
+    // Zhang et al., appendix: tan φ_w of the first branch cuts corners off, F_p is too large.
+    let camera = camera(N, F);
+    let lambda = 11.0;
+    let to_m = [0, 1].map(|i| f64::from(IMAGE) / 2.0 / f64::from(RES[i]));
+    for (degrees, q_off, p_off) in [(60.0, 0.54, 1.155), (30.0, 1.0, 2.0), (20.0, 1.0, 1.84)] {
+        let theta = f64::to_radians(degrees);
+        let (sin, cos, tan, k) = (theta.sin(), theta.cos(), theta.tan(), PHI.tan());
+        let map = &plan_view(&camera, theta, Warp::Lambda(lambda)).maps[0];
+        let (y, z) = (-0.3, 20.0);
+        let error = map.perspective_error(&camera, DVec3::new(0.0, -y, -z)).unwrap();
+        let is_first = degrees > 30.0;
+        let mu = if is_first { (F - N + (F + N) * k / tan) * sin } else { 2.0 * F * k * cos };
+        let z_w = if is_first {
+            (z - N + N * k / tan - y / tan) * sin + lambda
+        } else {
+            (F * k - (F - z) * tan - y) * cos + lambda
+        };
+        let tan_phi_w = if is_first { F * k / (mu + lambda) } else { F * k / lambda };
+        let printed_q = 2.0 * tan_phi_w / k * z_w / z;
+        assert_close(off(error.s, printed_q * to_m[0]), q_off, 1e-2, &format!("E_q at {degrees}°"));
+        let right_p = mu / (k * (lambda + mu) * lambda) * z_w * z_w / z;
+        let printed_p = right_p * if is_first { 1.0 / sin } else { 1.0 / (k * cos) };
+        assert_close(off(error.t, printed_p * to_m[1]), p_off, 5e-3, &format!("E_p at {degrees}°"));
+    }
+}
