@@ -39,8 +39,9 @@ pub(super) fn around(points: &[DVec3], bounds: Aabb) -> Vec<(DVec3, DVec3)> {
     let closest = bounds.size().max_element().max(1e-6) * 1e-3;
     let mut views = Vec::new();
     for elevation_deg in [12.0_f64, 22.0, 32.0] {
-        for k in 0..16 {
-            let azimuth = (f64::from(k) + 0.5) / 16.0 * TAU;
+        // Most models stand along the axes: seen from between them, two of their sides show.
+        for azimuth_deg in (0..4).flat_map(|quarter| [35, 55].map(|turn| quarter * 90 + turn)) {
+            let azimuth = f64::from(azimuth_deg).to_radians();
             let (sin, cos) = elevation_deg.to_radians().sin_cos();
             let back = DVec3::new(azimuth.sin() * cos, sin, azimuth.cos() * cos);
             let right = DVec3::Y.cross(back).normalize();

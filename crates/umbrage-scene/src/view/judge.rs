@@ -63,7 +63,7 @@ impl Judged {
             counts.behind += share(!is_seen(sight.facing, direction));
             counts.content += share(stands_out);
             counts.upward += share(sight.facing & UP != 0);
-            counts.close += share(sight.distance < 0.08 * eye.distance(target));
+            counts.close += share(sight.distance < 0.15 * eye.distance(target));
             counts.nearest = counts.nearest.min(sight.distance);
             for (share_along, axis) in facing_along.iter_mut().zip([DVec3::X, DVec3::Z]) {
                 let towards_eye = axis * direction.dot(axis).signum();
@@ -93,10 +93,10 @@ impl Judged {
             + 0.8 * peak(self.content, 0.4)
             + 0.6 * peak(self.upward, 0.45)
             + 0.5 * (self.depth_spread / 0.8).min(1.0)
-            + 1.0 * (self.hit / 0.75).min(1.0)
+            + 2.0 * (self.hit / 0.8).min(1.0)
             + 0.6 * (self.sides / self.hit.max(0.01) / 0.3).min(1.0)
             - 3.0 * self.behind
-            - 2.5 * self.void
-            - 2.0 * self.close
+            - 5.0 * self.void
+            - 4.0 * self.close
     }
 }
