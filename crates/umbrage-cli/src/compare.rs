@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::output::{ReportFolder, note, print};
-use crate::pixels::{self, Shadowed, Texels, counted, milliseconds};
+use crate::pixels::{self, NOTHING_TO_SHADOW, Shadowed, Texels, counted, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene, tell_notices};
 use crate::spec::Technique;
@@ -75,6 +75,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 
     let size = onlooker.camera.image();
     let seconds = Some(truth.seconds);
+    let has_shadows = truth.counted.contains(&true);
     let counted = Image::new(size, truth.counted)?;
     let truth = Picture::new(size, truth.shadowed)?;
     let mut notices: Vec<String> = scene.notices.iter().map(|n| n.0.clone()).collect();
@@ -115,6 +116,9 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
         Ok(())
     })?;
     drop(progress);
+    if !has_shadows {
+        log::warn!("{NOTHING_TO_SHADOW}");
+    }
 
     let page = args.output.join("index.html");
     if args.json {

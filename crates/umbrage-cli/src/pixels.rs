@@ -8,6 +8,10 @@ use umbrage::{Bounds, Camera, Light, Plan, Planner};
 use umbrage_measure::Rgb;
 use umbrage_trace::{Band, Reference, Sample, View, shade};
 
+/// What to say of a picture none of whose pixels [count](counted).
+pub(crate) const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
+     the view's range: there are no shadows to see";
+
 /// What shadows look like, whoever made them.
 #[derive(Default)]
 pub(crate) struct Shadowed {

@@ -6,7 +6,7 @@ use crate::setup::{Onlooker, lamp, onlooker, open_scene, option_error, tell_noti
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;
-use umbrage::{Bounds, MapError, Planner, Warp};
+use umbrage::{Bounds, MapError, Planner, ShadowMap, Warp};
 
 #[derive(Serialize)]
 struct PlanJson {
@@ -52,6 +52,9 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
         .plan(&onlooker.camera, &lamp.light, &bounds, &args.shadows.options)
         .map_err(|e| option_error(&e))?;
     if args.json {
+        if plan.maps.iter().all(ShadowMap::is_empty) {
+            log::warn!("{}", nothing_served(&onlooker));
+        }
         print(&format!("{}\n", serde_json::to_string_pretty(&PlanJson::from(plan))?))
     } else {
         print(&table(plan, &onlooker, args))
@@ -83,6 +86,17 @@ impl From<MapError> for ErrorJson {
     }
 }
 
+/// Why a map is empty.
+fn nothing_served(onlooker: &Onlooker) -> String {
+    let [near, far] = [onlooker.look.near, onlooker.look.far].map(six_digits);
+    format!("nothing lit between {near} and {far} metres of the view receives shadows")
+}
+
+/// As many as there is any use in reading.
+fn six_digits(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
 fn table(plan: &umbrage::Plan, onlooker: &Onlooker, args: &args::Plan) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.
@@ -96,14 +110,11 @@ fn table(plan: &umbrage::Plan, onlooker: &Onlooker, args: &args::Plan) -> String
     for (i, map) in plan.maps.iter().enumerate() {
         line(format_args!(""));
         if map.is_empty() {
-            let [near, far] = [onlooker.look.near, onlooker.look.far];
-            line(format_args!(
-                "map {i}: empty: nothing lit between {near} and {far} metres of the view receives shadows"
-            ));
+            line(format_args!("map {i}: empty: {}", nothing_served(onlooker)));
             continue;
         }
         let [w, h] = map.resolution;
-        let [near, far] = map.split;
+        let [near, far] = map.split.map(six_digits);
         line(format_args!("map {i}: {w}x{h} texels, {near} to {far} metres"));
         let warp = match (map.lambda, args.shadows.options.warp) {
             (Some(lambda), _) => format!("λ = {lambda:.6} m"),

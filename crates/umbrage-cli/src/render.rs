@@ -2,7 +2,7 @@
 
 use crate::args::{self, Aov, PictureKind};
 use crate::output::check_file;
-use crate::pixels::{self, Shadowed, Texels, counted, linear_color, middles};
+use crate::pixels::{self, NOTHING_TO_SHADOW, Shadowed, Texels, counted, linear_color, middles};
 use crate::progress::Progress;
 use crate::setup::{lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
@@ -81,6 +81,9 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
         }
     }
     drop(progress);
+    if (needs_map || needs_truth) && !layers.counted.contains(&true) {
+        log::warn!("{NOTHING_TO_SHADOW}");
+    }
     match kind {
         PictureKind::Png => layers.write_png(args, &view),
         PictureKind::Exr => layers.write_exr(args, camera.image()),

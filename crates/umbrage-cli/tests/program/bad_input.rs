@@ -10,6 +10,7 @@ fn desk() -> Desk {
     desk.write("broken.glb", "glTF but not really");
     desk.write("empty.gltf", r#"{"asset": {"version": "2.0"}}"#);
     desk.write("file", "");
+    desk.write("prose.glb", "Call me Ishmael.");
     std::fs::create_dir(desk.path("full")).unwrap();
     desk.write("full/thesis.tex", "precious");
     std::fs::create_dir(desk.path("folder.png")).unwrap();
@@ -144,7 +145,8 @@ fn scenes() {
         ("no/such.gltf", "there is no file no/such.gltf"),
         ("broken.glb", "broken.glb"),
         ("empty.gltf", "empty.gltf"),
-        ("file", "file"),
+        ("file", "file: header: is neither binary glTF 2.0 nor JSON"),
+        ("prose.glb", "prose.glb: header: is neither binary glTF 2.0 nor JSON"),
         ("full", "full is a folder"),
     ] {
         for command in [

@@ -160,7 +160,9 @@ fn looking_away_from_everything_gives_an_empty_map() {
     let plan = desk.json(&[&away[..], &["--json"]].concat());
     assert_eq!(plan["texels"], 0);
     assert_eq!(plan["maps"][0]["resolution"], serde_json::json!([0, 0]));
-    assert!(desk.succeed(&away).contains("empty"));
+    assert!(desk.succeed(&away).contains("empty: nothing lit between 1 and 100 metres"));
+    let json = desk.run(&[&away[..], &["--json"]].concat());
+    assert!(json.stderr.contains("nothing lit between 1 and 100 metres"), "{}", json.stderr);
 }
 
 #[test]

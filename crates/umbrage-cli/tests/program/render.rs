@@ -121,3 +121,18 @@ fn auto_says_what_it_takes_and_reference_does_not() {
     assert!(run("auto").stderr.contains("reference"));
     assert_eq!(run("reference").stderr, "");
 }
+
+#[test]
+fn a_picture_without_anything_to_shadow_says_so() {
+    let desk = Desk::new();
+    let away = ["--eye", "0,5,50", "--target", "0,8,100", "--size", "16x9"];
+    let says = |args: &[&str]| {
+        let run = desk.run(&[args, &away[..]].concat());
+        assert_eq!(run.code, 0, "{args:?}: {}", run.stderr);
+        run.stderr.contains("no pixel shows a surface that faces the light")
+    };
+    assert!(says(&["render", "pole", "-o", "sky.png"]));
+    assert!(says(&["compare", "pole", "-o", "report", "--shadows", "uniform@16"]));
+    // A picture of no light has nothing to complain about.
+    assert!(!says(&["render", "pole", "-o", "sky.png", "--aov", "depth"]));
+}

@@ -28,6 +28,9 @@ impl<'a> Document<'a> {
             problem,
         };
         let (json, blob) = match bytes.strip_prefix(b"glTF") {
+            None if !bytes.trim_ascii_start().starts_with(b"{") => {
+                return Err(fail("header", "is neither binary glTF 2.0 nor JSON".into()));
+            }
             None => (Cow::Borrowed(bytes), None),
             Some(rest) => {
                 // The length field: the crate trusts it to be at least the header's own.
