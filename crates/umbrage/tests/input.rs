@@ -48,7 +48,7 @@ fn cameras_name_what_is_wrong() {
         (LookAt { up: DVec3::NAN, ..VIEW }, "camera.up"),
         (LookAt { fov_y_rad: 0.0, ..VIEW }, "camera.fov_y_rad"),
         (LookAt { fov_y_rad: -1.0, ..VIEW }, "camera.fov_y_rad"),
-        (LookAt { fov_y_rad: 3.1415927, ..VIEW }, "camera.fov_y_rad"),
+        (LookAt { fov_y_rad: std::f64::consts::PI, ..VIEW }, "camera.fov_y_rad"),
         (LookAt { fov_y_rad: nan, ..VIEW }, "camera.fov_y_rad"),
         (LookAt { near: 0.0, ..VIEW }, "camera.near"),
         (LookAt { near: nan, ..VIEW }, "camera.near"),
