@@ -167,6 +167,12 @@ pub(crate) fn lamp(args: &LightArgs, scene: Option<&Scene>) -> Result<Lamp> {
         return Ok(Lamp { name: None, light: Light::Directional { direction: AFTERNOON_SUN } });
     };
     let Some(name) = &args.light else {
+        if !scene.lights.is_empty() && scene.lights.iter().all(|l| l.light.is_none()) {
+            log::warn!(
+                "all of the scene's lights are point lights, which this version makes no \
+                 shadows of; a sun shines instead",
+            );
+        }
         let found = scene.default_light();
         let name = scene.lights.contains(&found).then_some(found.name);
         // The scene promises a light that casts.

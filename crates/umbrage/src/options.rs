@@ -52,9 +52,9 @@ pub enum Warp {
         /// Metres along the view, > 0; `None`: √(n f) of the receivers seen.
         focus: Option<f64>,
     },
-    /// The λ of least error, measured over the receivers seen; never worse than `Uniform` (under spot
-    /// lights, with [`Objective::Area`]: by no more than one per cent). Where sin θ < sin φ/4 it fades
-    /// out.
+    /// The λ that makes the objective smallest over the receivers seen, and never larger than
+    /// `Uniform` has it (under spot lights, with [`Objective::Area`]: by no more than one per cent). Where
+    /// sin θ < sin φ/4 it fades out.
     Adaptive(Objective),
     /// Logarithmic rows behind the λ = n/sin θ perspective: the unreachable optimum. Only the CPU
     /// reference can render it.

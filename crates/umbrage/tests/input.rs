@@ -325,6 +325,40 @@ fn landmarks() {
     }
 }
 
+/// Culling planes let through what stands between the view and the light, and nothing beside, below or
+/// behind it.
+#[test]
+fn casters_are_culled() {
+    let level = LookAt { eye: DVec3::ZERO, target: DVec3::NEG_Z, ..VIEW };
+    let camera = Camera::look_at(level).unwrap();
+    let cube = |center: DVec3| Aabb::new(center - 1.0, center + 1.0);
+    let sun = Light::Directional { direction: DVec3::NEG_Y };
+    let spot = Light::Spot(SpotLight {
+        position: DVec3::new(0.0, 200.0, -50.0),
+        direction: DVec3::NEG_Y,
+        half_angle_rad: 0.2,
+        near: 1.0,
+        range: 400.0,
+    });
+    for light in [sun, spot] {
+        for (name, warp) in WARPS {
+            let mut planner = Planner::new();
+            let plan = planner.plan(&camera, &light, &Bounds::default(), &options(warp)).unwrap();
+            let map = &plan.maps[0];
+            for (center, casts) in [
+                (DVec3::new(0.0, 0.0, -50.0), true),
+                (DVec3::new(0.0, 150.0, -50.0), true),
+                (DVec3::new(0.0, -150.0, -50.0), false),
+                (DVec3::new(120.0, 20.0, -50.0), false),
+                (DVec3::new(0.0, 20.0, -120.0), false),
+                (DVec3::new(0.0, 20.0, 10.0), false),
+            ] {
+                assert_eq!(map.may_cast(cube(center)), casts, "{name}, {light:?}: {center}");
+            }
+        }
+    }
+}
+
 /// What single precision takes away near the eye stays far below a texel, 100 km from the world's
 /// origin too.
 #[test]

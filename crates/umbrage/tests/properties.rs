@@ -92,7 +92,7 @@ proptest! {
 #[test]
 fn maxima_are_reached() {
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
-        cases: 1_000,
+        cases: 10_000,
         failure_persistence: None,
         ..ProptestConfig::default()
     });
