@@ -32,7 +32,7 @@ pub struct LookAt {
     pub up: DVec3,
     /// Vertical field of view, radians, in (0, π).
     pub fov_y_rad: f64,
-    /// Distance at which the view begins, ≥ 1e-9.
+    /// Distance at which the view begins, ≥ 1e-12.
     pub near: f64,
     /// Distance at which shadows end, > `near`.
     pub far: f64,
@@ -201,8 +201,8 @@ impl Camera {
     }
 
     fn checked(self) -> Result<Self, Error> {
-        check(self.near >= 1e-9 && self.near.is_finite(), "camera.near", || {
-            format!("must be finite and at least 1e-9, is {}", self.near)
+        check(self.near >= 1e-12 && self.near.is_finite(), "camera.near", || {
+            format!("must be finite and at least 1e-12, is {}", self.near)
         })?;
         check(self.far > self.near && self.far <= 1e12, "camera.far", || {
             format!("must exceed camera.near ({}) and be at most 1e12, is {}", self.near, self.far)

@@ -24,7 +24,7 @@ pub struct SpotLight {
     pub direction: DVec3,
     /// Half the cone's opening angle, radians, in (0, 85°]. Nothing outside is lit.
     pub half_angle_rad: f64,
-    /// Distance from the light, measured along the axis, at which shadows begin, metres, ≥ 1e-9.
+    /// Distance from the light, measured along the axis, at which shadows begin, metres, ≥ 1e-12.
     /// Receivers nearer than this get no shadow; casters nearer than this cast onto those beyond.
     pub near: f64,
     /// Distance along the axis at which light ends, metres, > `near`.
@@ -91,8 +91,8 @@ impl Light {
                     "light.half_angle_rad",
                     || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
                 )?;
-                check(spot.near >= 1e-9 && spot.near.is_finite(), "light.near", || {
-                    format!("must be finite and at least 1e-9, is {}", spot.near)
+                check(spot.near >= 1e-12 && spot.near.is_finite(), "light.near", || {
+                    format!("must be finite and at least 1e-12, is {}", spot.near)
                 })?;
                 check(spot.range > spot.near && spot.range <= 1e12, "light.range", || {
                     format!(

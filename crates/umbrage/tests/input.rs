@@ -129,6 +129,7 @@ fn odd_input_gives_sound_plans() {
         LookAt { up: view, ..VIEW },
         LookAt { near: 99.99, ..VIEW },
         LookAt { near: 1e-6, far: 1e9, ..VIEW },
+        LookAt { near: 1e-12, far: 1e12, ..VIEW },
         LookAt { eye: VIEW.eye + DVec3::X * 1e5, target: VIEW.target + DVec3::X * 1e5, ..VIEW },
         LookAt { fov_y_rad: 3.0, image: [1, 65536], ..VIEW },
     ];
