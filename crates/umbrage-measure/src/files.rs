@@ -8,12 +8,14 @@ use std::io::{Cursor, Write};
 use std::path::Path;
 
 /// Writes `bytes` to a file that nobody ever sees unfinished: into a temporary one in the same
-/// folder, then renamed. An existing file is replaced.
+/// folder, then renamed. An existing file is replaced; what is no plain file, such as a pipe or
+/// `/dev/stdout`, is written to.
 ///
 /// # Errors
 /// If the folder does not exist or cannot be written; nothing stays behind then.
 pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     let path = path.as_ref();
+    let is_device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".umbrage-");
@@ -21,6 +23,9 @@ pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let write = || {
+        if is_device {
+            return std::fs::write(path, bytes);
+        }
         let mut file = builder.tempfile_in(folder)?;
         file.write_all(bytes)?;
         file.persist(path).map_err(|e| e.error)?;
@@ -162,6 +167,18 @@ mod tests {
         std::fs::create_dir(&taken).unwrap();
         assert!(write_file(&taken, b"x").is_err());
         assert_eq!(only_file(folder.path()), ["taken"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_written_to_and_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let nowhere = folder.path().join("nowhere");
+        std::os::unix::fs::symlink("/dev/null", &nowhere).unwrap();
+        write_file(&nowhere, b"x").unwrap();
+        assert!(nowhere.is_symlink());
+        assert_eq!(std::fs::read(&nowhere).unwrap(), b"");
+        assert_eq!(only_file(folder.path()), ["nowhere"]);
     }
 
     #[cfg(unix)]

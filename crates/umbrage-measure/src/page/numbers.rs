@@ -3,7 +3,7 @@
 /// What stands for a figure that is not known.
 pub(super) const UNKNOWN: &str = "–";
 
-/// Three significant digits, grouped by thousands: `0.0132`, `4.10`, `1 234`.
+/// Three significant digits, grouped by thousands: `0.0132`, `4.10`, `1 230`.
 pub(super) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -31,7 +31,7 @@ pub(super) fn count(n: u64) -> String {
     grouped(&n.to_string())
 }
 
-/// A duration in words' units: `0.8 ms`, `12.3 s`, `4.5 min`.
+/// A duration in the unit that suits it: `0.800 ms`, `12.3 s`, `4.50 min`.
 pub(super) fn duration_ms(ms: f64) -> String {
     match ms {
         ms if ms < 1e3 => format!("{} ms", significant(ms)),

@@ -227,7 +227,7 @@ fn kinds(pictures: &[Pictures]) -> Vec<Kind> {
 }
 
 fn figures(r: &Measured) -> Vec<(&'static str, String)> {
-    let known = |v: Option<f64>| v.map(significant);
+    let known = |v: Option<f64>| v.filter(|v| v.is_finite()).map(significant);
     let e = &r.error_px;
     let times = r.ms.total().map(duration_ms);
     [
