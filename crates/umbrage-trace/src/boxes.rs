@@ -63,13 +63,15 @@ impl Boxes {
         let Some([start, end]) = clip(self.outermost, ray, range) else {
             return;
         };
-        let length = ray.direction.length();
+        // Not by the length, which underflows to zero for the shortest directions. No coordinate
+        // is then beyond 1, and all distances below D as well.
+        let longest = ray.direction.abs().max_element();
         let entry = ray.origin + ray.direction * start - self.center;
         // Nearest rounding may round down; the next float cannot be too near.
-        let distance = |t: f64| (((t - start) * length) as f32).next_up();
+        let distance = |t: f64| (((t - start) * longest) as f32).next_up();
         let single = obvhs::ray::Ray::new(
             entry.as_vec3a(),
-            (ray.direction / length).as_vec3a(),
+            (ray.direction / longest).as_vec3a(),
             0.0,
             distance(end),
         );

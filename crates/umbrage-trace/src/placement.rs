@@ -3,6 +3,9 @@ use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
 use umbrage_scene::Scene;
 
+/// Entries of transforms and of their inverses beyond this are refused: their squares would overflow.
+const LARGEST: f64 = 1e150;
+
 /// An instance's transform, split into what rays need.
 pub(crate) struct Placement {
     pub(crate) mesh: usize,
@@ -24,7 +27,11 @@ impl Placement {
         }
         let world_from_mesh = instance.world_from_mesh;
         let mesh_from_world = world_from_mesh.matrix3.inverse();
-        if !world_from_mesh.is_finite() || !mesh_from_world.is_finite() {
+        let is_usable = |m: DMat3| m.to_cols_array().iter().all(|c| c.abs() <= LARGEST);
+        if !(world_from_mesh.translation.is_finite()
+            && is_usable(world_from_mesh.matrix3)
+            && is_usable(mesh_from_world))
+        {
             return wrong("world_from_mesh", "must be finite and invertible");
         }
         let stretch = stretch(world_from_mesh.matrix3);

@@ -134,7 +134,7 @@ impl<'a> Reference<'a> {
             return 0.0;
         }
         let surface = &sample.surface;
-        let Some(index) = self.map_at(camera, surface.position) else {
+        let Some(MapTexel { map: index, .. }) = self.texel(camera, surface.position) else {
             return 1.0;
         };
         let map = &self.plan.maps[index];
@@ -143,23 +143,16 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// The map that serves a point, and where in it the point lies; `None` if no map does.
+    /// The first of the plan's maps that serves a point's depth and holds it, and where in it the
+    /// point lies; `None` if no map does.
     pub fn texel(&self, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
-        map_texel(self.plan, camera, world_position)
-    }
-
-    fn map_at(&self, camera: &Camera, world_position: DVec3) -> Option<usize> {
-        self.texel(camera, world_position).map(|t| t.map)
-    }
-}
-
-/// The first of the plan's maps that serves a point's depth and holds it.
-fn map_texel(plan: &Plan, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
-    plan.maps.iter().enumerate().filter(|(_, m)| m.serves(camera, world_position)).find_map(
-        |(index, map)| {
+        self.plan.maps.iter().enumerate().find_map(|(index, map)| {
+            if !map.serves(camera, world_position) {
+                return None;
+            }
             let st = map.project(world_position)?.truncate();
             let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
             is_inside.then(|| MapTexel { map: index, texel: texel_coordinates(map, st) })
-        },
-    )
+        })
+    }
 }

@@ -70,8 +70,8 @@ impl<'a> View<'a> {
         self.tracer
     }
 
-    /// Bands of rows that make up the picture from top to bottom, each so small that its samples fit
-    /// into memory whatever the picture's size.
+    /// Bands of rows that make up the picture from top to bottom, each of about half a million
+    /// samples (some 100 MB) whatever the picture's size, but at least one row.
     pub fn bands(&self) -> impl Iterator<Item = Range<u32>> + use<> {
         let [width, height] = self.camera.image();
         let samples_per_row = u64::from(width) * u64::from(self.grid).pow(2);

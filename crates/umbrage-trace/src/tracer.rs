@@ -177,8 +177,8 @@ impl<'a> Tracer<'a> {
     /// skipped, and so is every other triangle in whose plane the point lies as far as can be known.
     /// Those are neighbours met at an edge, copies of the triangle, and coplanar decals. "Can be
     /// known" is the sum of both surfaces' [`position_error`](Surface::position_error): how far
-    /// storing corners in single precision moves a surface, 2⁻²³ of its mesh's coordinates, plus some
-    /// 2⁻⁵⁰ of its world position.
+    /// storing corners in single precision moves a surface, 2⁻²³ of its corners' coordinates, plus
+    /// some 2⁻⁴⁹ of its world position.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
         let departure =
             Departure { from: surface.primitive, position_error: surface.position_error };
@@ -203,8 +203,10 @@ impl<'a> Tracer<'a> {
             (placement.mesh_from_world.transpose() * mesh_normal).try_normalize()
         };
         let plane = normal_of(corners);
-        let geometric_normal = world_normal(plane / plane.abs().max_element())
-            .map_or(-view_direction, |n| if n.dot(view_direction) > 0.0 { -n } else { n });
+        let geometric_normal = world_normal(plane / plane.abs().max_element()).map_or_else(
+            || -view_direction.normalize_or_zero(),
+            |n| if n.dot(view_direction) > 0.0 { -n } else { n },
+        );
         let indices = mesh.triangles[primitive.triangle as usize].map(|i| i as usize);
         let shading_normal = (!mesh.normals.is_empty())
             .then(|| weigh(indices.map(|i| mesh.normals[i].as_dvec3()), barycentrics))

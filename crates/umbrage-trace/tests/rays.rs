@@ -308,6 +308,12 @@ fn rays_that_are_none_hit_nothing() {
     }
     let ray = Ray { origin: up, direction: -DVec3::Y };
     assert_eq!(tracer.closest(ray, [1.0, 1.5]).map(|h| h.t), Some(1.0));
+    // However short or long its direction.
+    for scale in [1e-200, 1e200] {
+        let ray = Ray { origin: up, direction: -DVec3::Y * scale };
+        let hit = tracer.closest(ray, EVERYWHERE).unwrap();
+        assert!((hit.t * scale - 1.0).abs() < 1e-12, "{hit:?}");
+    }
     // From either side, and backwards along an unbounded line.
     let from_below = Ray { origin: -up, direction: DVec3::Y };
     assert!(tracer.occluded(from_below, EVERYWHERE));
@@ -319,13 +325,16 @@ fn rays_that_are_none_hit_nothing() {
 fn broken_scenes_are_named() {
     let good = || scene(vec![ground(1.0)], &[(0, DAffine3::IDENTITY)]);
     type Breakage = fn(&mut Scene);
-    let cases: [(&str, Breakage); 8] = [
+    let cases: [(&str, Breakage); 9] = [
         ("meshes[0].positions[2]", |s| s.meshes[0].positions[2].y = f32::NAN),
         ("meshes[0].triangles[1]", |s| s.meshes[0].triangles[1] = [0, 1, 4]),
         ("meshes[0].normals", |s| s.meshes[0].normals.truncate(2)),
         ("meshes[0].material", |s| s.meshes[0].material = 9),
         ("instances[0].mesh", |s| s.instances[0].mesh = 1),
         ("instances[0].world_from_mesh", |s| s.instances[0].world_from_mesh = DAffine3::ZERO),
+        ("instances[0].world_from_mesh", |s| {
+            s.instances[0].world_from_mesh = DAffine3::from_scale(DVec3::new(1e-200, 1.0, 1.0));
+        }),
         ("instances[0]", |s| s.instances[0].world_from_mesh.translation.x = 1e13),
         ("materials[0].base_color_texture", |s| {
             s.materials[0].base_color_texture = Some(TextureId(0));
