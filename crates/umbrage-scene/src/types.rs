@@ -14,9 +14,9 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Material fields refer here.
     pub textures: Vec<Texture>,
-    /// The file's cameras, in its order.
+    /// The file's cameras, in the order of the nodes that hold them (parents before children).
     pub cameras: Vec<SceneCamera>,
-    /// The file's lights, in its order.
+    /// The file's lights, in the order of the nodes that hold them (parents before children).
     pub lights: Vec<SceneLight>,
     /// What was repaired or left out on loading.
     pub notices: Vec<Notice>,
@@ -89,7 +89,7 @@ pub struct Texture {
 }
 
 /// How a texture goes on outside [0, 1].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// Again and again, glTF's default.
     #[default]
@@ -100,7 +100,7 @@ pub enum Wrap {
     Clamp,
 }
 
-/// A camera of the scene. Its picture's size and, if not given, its aspect come from the user.
+/// A camera of the scene. Its picture's size, and with it the aspect, come from the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCamera {
     /// The file's name for it, or `camera0`, `camera1`, …
@@ -148,7 +148,8 @@ impl Scene {
     }
 
     /// The box around everything drawn, metres, world space, exact to rounding; [`Aabb::EMPTY`]
-    /// without triangles. Costs a pass over the vertices of every instance that is turned.
+    /// without triangles. Costs a pass over the vertices of every instance that is turned and may
+    /// reach beyond those before it.
     pub fn bounds(&self) -> Aabb {
         let boxes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
         let mut all = Aabb::EMPTY;
@@ -162,11 +163,12 @@ impl Scene {
                 .iter()
                 .all(|a| a.to_array().iter().filter(|&&c| c != 0.0).count() == 1);
             let to_world = |p| i.world_from_mesh.transform_point3(p);
-            all = all.union(if keeps_axes {
-                Aabb::around(boxes[i.mesh].corners().map(to_world))
-            } else {
-                self.meshes[i.mesh].bounds_in(to_world)
-            });
+            let loose = Aabb::around(boxes[i.mesh].corners().map(to_world));
+            if all.union(loose) == all {
+                continue;
+            }
+            all =
+                all.union(if keeps_axes { loose } else { self.meshes[i.mesh].bounds_in(to_world) });
         }
         all
     }

@@ -304,6 +304,28 @@ fn masks_keep_cutoff_texture_and_addressing() {
 }
 
 #[test]
+fn textures_that_differ_in_nothing_are_stored_once() {
+    let mut file = masked();
+    let [same, repeating] = [json!({"source": 0, "sampler": 0}), json!({"source": 0})];
+    for texture in [same, repeating] {
+        let index = file.push("textures", texture);
+        let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": index}}});
+        let material = file.push("materials", material);
+        let primitives = file.json["meshes"][0]["primitives"].as_array_mut().unwrap();
+        let mut another = primitives[0].clone();
+        another["material"] = json!(material);
+        primitives.push(another);
+    }
+    let scene = file.load().unwrap();
+    let textures: Vec<usize> = scene
+        .meshes
+        .iter()
+        .map(|m| scene.materials[m.material].base_color_texture.unwrap().0)
+        .collect();
+    assert_eq!((textures, scene.textures.len()), (vec![0, 0, 1], 2));
+}
+
+#[test]
 fn translucent_materials_are_cut_at_one_half_and_say_so() {
     let scene = masked().set("/materials/0/alphaMode", json!("BLEND")).load().unwrap();
     assert_eq!(scene.materials[0].alpha, Alpha::Mask { cutoff: 0.5 });

@@ -28,8 +28,9 @@ pub(super) struct Materials {
     pub(super) textures: Vec<Texture>,
     /// By index in the file; `None` is glTF's default material.
     loaded: HashMap<Option<usize>, (usize, Option<TexCoords>)>,
-    /// By index in the file; `None` could not be loaded.
-    loaded_textures: HashMap<usize, Option<TextureId>>,
+    /// By the image's index in the file and its addressing, for files list textures that differ in
+    /// nothing we read; `None` could not be loaded.
+    loaded_textures: HashMap<(usize, [Wrap; 2]), Option<TextureId>>,
 }
 
 impl Materials {
@@ -106,12 +107,8 @@ impl Materials {
         place: &str,
         notices: &mut Notices,
     ) -> Result<Option<TextureId>, SceneError> {
-        let key = info.index.value();
-        if let Some(&found) = self.loaded_textures.get(&key) {
-            return Ok(found);
-        }
         let json = document.get(info.index, place)?;
-        let place = format!("textures[{key}]");
+        let place = format!("textures[{}]", info.index.value());
         let wrap = match json.sampler {
             None => [Wrap::Repeat; 2],
             Some(id) => {
@@ -123,6 +120,10 @@ impl Materials {
                 })
             }
         };
+        let key = (json.source.value(), wrap);
+        if let Some(&found) = self.loaded_textures.get(&key) {
+            return Ok(found);
+        }
         let image = document.get(json.source, &place)?;
         let place = format!("images[{}]", json.source.value());
         let bytes = match (image.buffer_view, &image.uri) {
