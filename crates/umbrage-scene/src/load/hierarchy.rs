@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Index;
 
 /// Entries of transforms beyond this count as overflow, long before products with positions do.
-const LARGEST: f64 = 1e100;
+pub(super) const LARGEST: f64 = 1e100;
 
 /// Where every node of a file stands.
 pub(super) struct Hierarchy {

@@ -14,7 +14,7 @@ use crate::types::{Instance, Mesh, Scene};
 use document::{Document, Notices};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use gltf::json::{Index, Node};
-use hierarchy::Hierarchy;
+use hierarchy::{Hierarchy, LARGEST};
 use material::Materials;
 use std::collections::HashMap;
 use std::path::Path;
@@ -34,7 +34,8 @@ const WORLD_END: f64 = 1e12;
 /// These repairs are made, and told in [`Scene::notices`]: points and lines are left out, missing
 /// normals are computed, nodes that flatten their meshes are left out, materials whose image is
 /// missing or broken are plain, translucent (`BLEND`) materials are solid where alpha is at least
-/// one half and absent elsewhere, spot cones beyond 85° are narrowed.
+/// one half and absent elsewhere, spot cones beyond 85° are narrowed. Vertex colours, morph targets
+/// and orthographic cameras are left out, with a notice too.
 ///
 /// # Errors
 /// A file that cannot be read, breaks off, refers to files elsewhere, has indices that point
@@ -269,5 +270,6 @@ fn name_if_empty(name: &mut String, kind: &str, index: usize) {
 /// Whether a transform has no inverse worth the name.
 fn is_flat(m: DMat3) -> bool {
     let lengths = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
-    m.determinant().abs() <= 1e-9 * lengths || !m.inverse().is_finite()
+    let is_usable = |inverse: DMat3| inverse.to_cols_array().iter().all(|c| c.abs() <= LARGEST);
+    m.determinant().abs() <= 1e-9 * lengths || !is_usable(m.inverse())
 }

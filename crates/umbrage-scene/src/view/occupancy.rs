@@ -229,7 +229,9 @@ impl Occupancy {
         let mut at = start.floor().clamp(DVec3::ZERO, end - 1.0).as_ivec3();
         let step = direction.signum().as_ivec3();
         let ahead = at.as_dvec3() + direction.signum().max(DVec3::ZERO);
-        let mut next = (ahead - origin) * inverse;
+        // A direction along a cell's face never leaves through it (0·∞ is NaN, of either sign).
+        let along_face = direction.cmpeq(DVec3::ZERO);
+        let mut next = DVec3::select(along_face, DVec3::INFINITY, (ahead - origin) * inverse);
         let per_cell = inverse.abs();
         let mut distance = enter;
         let mut is_own = self.cell_of(eye).is_some();
@@ -244,7 +246,6 @@ impl Occupancy {
                 return Some(Sight { distance, cell, facing });
             }
             is_own = false;
-            // NaN (a direction along a cell's face) loses against any number.
             let axis = (0..3).min_by(|&i, &j| next[i].total_cmp(&next[j])).unwrap_or(0);
             distance = next[axis];
             if !distance.is_finite() {
