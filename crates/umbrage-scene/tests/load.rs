@@ -220,6 +220,36 @@ fn instancing_extension_draws_copies() {
     assert_eq!(scene.instances.len(), 2);
     let far = scene.instances[1].world_from_mesh.transform_point3(DVec3::X);
     assert_eq!(far, DVec3::new(7.0, 0.0, 0.0));
+    let with = |attributes| {
+        let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
+        File::triangle().set("/nodes/0/extensions", extension)
+    };
+    // Attributes of the file's own move nothing.
+    assert_eq!(with(json!({"_ID": 0})).load().unwrap().instances.len(), 1);
+    let error = with(json!({"TRANSLATION": "no"})).error();
+    assert!(error.contains("TRANSLATION must be an accessor's index"), "{error}");
+}
+
+#[test]
+fn primitives_take_only_their_own_of_shared_vertices() {
+    let mut file = File::triangle();
+    let six: Vec<f32> = (0..18).map(|i| (i * i) as f32).collect();
+    let (positions, normals) = (file.floats("VEC3", &six), file.floats("VEC3", &[0.6; 18]));
+    let [first, last] = [[0, 1, 2], [5, 3, 1]].map(|corners| file.u16s("SCALAR", &corners));
+    let of = |indices| {
+        json!({
+            "attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices
+        })
+    };
+    file.json["meshes"][0]["primitives"] = json!([of(first), of(last)]);
+    let scene = file.load().unwrap();
+    let expected = [vec![0, 1, 2], vec![1, 3, 5]];
+    for (mesh, expected) in scene.meshes.iter().zip(expected) {
+        let positions: Vec<Vec3> =
+            expected.iter().map(|&i: &usize| Vec3::from_slice(&six[3 * i..])).collect();
+        assert_eq!((&mesh.positions, mesh.normals.len()), (&positions, 3));
+    }
+    assert_eq!(scene.meshes[1].triangles, [[2, 1, 0]]);
 }
 
 #[test]

@@ -158,6 +158,7 @@ impl Loader<'_> {
                 primitive::load(document, primitive, &place, material, coords, &mut self.notices)?;
             if let Some(mut loaded) = loaded {
                 finish(self, &mut loaded, (primitive, &place))?;
+                primitive::drop_unused_vertices(&mut loaded);
                 made.push(self.scene.meshes.len());
                 self.scene.meshes.push(loaded);
             }
@@ -175,18 +176,29 @@ impl Loader<'_> {
         };
         let place = format!("{place}.extensions.EXT_mesh_gpu_instancing");
         let id = |name: &str| {
-            attributes[name].as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new)
+            let value = &attributes[name];
+            let index = value.as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new);
+            match index {
+                None if !value.is_null() => Err(self
+                    .document
+                    .invalid(&place, format!("{name} must be an accessor's index"))),
+                index => Ok(index),
+            }
         };
         let vectors =
-            |name: &str| id(name).map(|i| self.document.floats::<3>(i, &place)).transpose();
+            |name: &str| id(name)?.map(|i| self.document.floats::<3>(i, &place)).transpose();
         let (translations, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
-        let rotations = id("ROTATION").map(|i| self.document.floats::<4>(i, &place)).transpose()?;
+        let rotations =
+            id("ROTATION")?.map(|i| self.document.floats::<4>(i, &place)).transpose()?;
         let counts = [
             translations.as_ref().map(Vec::len),
             scales.as_ref().map(Vec::len),
             rotations.as_ref().map(Vec::len),
         ];
-        let n = counts.into_iter().flatten().next().unwrap_or(0);
+        let Some(n) = counts.into_iter().flatten().next() else {
+            // Only attributes of the file's own: all copies stand where the node does.
+            return Ok(vec![DAffine3::IDENTITY]);
+        };
         if counts.into_iter().flatten().any(|other| other != n) {
             return Err(self.document.invalid(&place, "its attributes differ in number"));
         }

@@ -186,6 +186,36 @@ pub(super) fn shade_flat(mesh: &mut Mesh) {
     }
 }
 
+/// Keeps only the vertices that triangles use: files may let all primitives share one large array.
+pub(super) fn drop_unused_vertices(mesh: &mut Mesh) {
+    let mut used = vec![false; mesh.positions.len()];
+    for &i in mesh.triangles.iter().flatten() {
+        used[i as usize] = true;
+    }
+    if used.iter().all(|&u| u) {
+        return;
+    }
+    let mut kept = 0;
+    let new_index: Vec<u32> = used
+        .iter()
+        .map(|&used| {
+            kept += u32::from(used);
+            kept - u32::from(used)
+        })
+        .collect();
+    for i in mesh.triangles.iter_mut().flatten() {
+        *i = new_index[*i as usize];
+    }
+    mesh.positions = keep(&mesh.positions, &used);
+    mesh.normals = keep(&mesh.normals, &used);
+    mesh.uvs = keep(&mesh.uvs, &used);
+}
+
+/// The values that are used; none of an empty list.
+fn keep<T: Copy>(values: &[T], used: &[bool]) -> Vec<T> {
+    values.iter().zip(used).filter(|(_, used)| **used).map(|(value, _)| *value).collect()
+}
+
 /// Makes all normals unit vectors; returns how many had no direction of their own.
 fn repair_normals(mesh: &mut Mesh) -> usize {
     let mut missing = vec![false; mesh.normals.len()];
