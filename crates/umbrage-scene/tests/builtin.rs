@@ -1,6 +1,7 @@
 //! The built-in scenes: sound geometry, the promised sizes, closed-form shadows.
 
 use glam::{DVec3, Vec3};
+use umbrage::Aabb;
 use umbrage_scene::{BuiltinInfo, Scene, SceneError, builtin, builtins, closed_form};
 
 fn small(info: &BuiltinInfo) -> u32 {
@@ -64,6 +65,22 @@ fn default_sizes_build_quickly_and_largest_reach_millions() {
             .map(|s| builtin(info.name, Some(s)).unwrap().drawn_triangles() as f64);
         // The growth from one to the next, twice more.
         assert!(b * (b / a).powi(2) > 4e6, "{}: {a} and {b} triangles", info.name);
+    }
+}
+
+#[test]
+fn bounds_are_those_of_all_corners() {
+    for info in builtins() {
+        let scene = builtin(info.name, Some(small(info))).unwrap();
+        let corners = scene.instances.iter().flat_map(|i| {
+            let mesh = &scene.meshes[i.mesh];
+            let corners = mesh.triangles.iter().flatten();
+            corners
+                .map(|&k| i.world_from_mesh.transform_point3(mesh.positions[k as usize].as_dvec3()))
+        });
+        let (bounds, expected) = (scene.bounds(), Aabb::around(corners));
+        let off = (bounds.min - expected.min).abs().max((bounds.max - expected.max).abs());
+        assert!(off.max_element() < 1e-9, "{}: {bounds:?}, not {expected:?}", info.name);
     }
 }
 

@@ -275,3 +275,21 @@ fn faced(direction: DVec3) -> Facing {
 pub(super) fn is_seen(facing: Facing, direction: DVec3) -> bool {
     facing & faced(-direction) != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_along_the_faces_of_cells_see_what_others_see() {
+        let scene = crate::builtin("pole", None).unwrap();
+        let grid = Occupancy::of(&scene, scene.bounds());
+        let eye = DVec3::new(5.0, 3.0, 5.0);
+        let on_face = (eye - grid.bounds.min) / grid.cell;
+        assert_eq!((on_face.x.fract(), on_face.z.fract()), (0.0, 0.0));
+        for zero in [0.0, -0.0] {
+            let sight = grid.look(eye, DVec3::new(zero, -1.0, zero)).unwrap();
+            assert!((sight.distance - 3.0).abs() < 2.0 * grid.cell.y, "{}", sight.distance);
+        }
+    }
+}
