@@ -24,7 +24,7 @@
 //! })?;
 //! let light = Light::Directional { direction: glam::dvec3(1.0, -1.0, 0.5) };
 //! let mut planner = Planner::new();
-//! let bounds = Bounds::of_scene(tracer.bounds());
+//! let bounds = Bounds::of_scene(scene.bounds());
 //! let plan = planner.plan(&camera, &light, &bounds, &Options::default())?;
 //!
 //! let quietly = |_rows: u64| {};

@@ -69,7 +69,9 @@ fn attenuation(light: &Light, position: DVec3) -> f32 {
     match light {
         Light::Directional { .. } => 1.0,
         Light::Spot(spot) => {
-            let relative = position.distance(spot.position) / spot.range;
+            // Range counts along the axis, as for what is lit at all.
+            let axis = spot.direction.normalize_or_zero();
+            let relative = axis.dot(position - spot.position) / spot.range;
             (1.0 - relative.powi(4)).max(0.0).powi(2) as f32
         }
     }

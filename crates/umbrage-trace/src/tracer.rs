@@ -146,7 +146,8 @@ impl<'a> Tracer<'a> {
         self.scene
     }
 
-    /// A box around everything drawn, metres, world space; [`Aabb::EMPTY`] without triangles.
+    /// A box around everything drawn, metres, world space; [`Aabb::EMPTY`] without triangles. Loose where
+    /// instances are turned; [`Scene::bounds`] is exact.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }

@@ -11,6 +11,8 @@ use std::io::Cursor;
 
 /// Images beyond this many pixels a side are refused.
 const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Pixels of all images of a scene together: 2 GiB once decoded.
+const MAX_PIXELS: u64 = 1 << 29;
 
 /// Where in a primitive a material finds its texture coordinates, and what to do to them.
 #[derive(Clone, Copy)]
@@ -131,10 +133,11 @@ impl Materials {
             (None, Some(uri)) => document.fetch(uri, &place),
             (None, None) => Err(document.invalid(&place, "has neither uri nor bufferView")),
         };
+        let decoded_so_far: u64 = self.textures.iter().map(|t| t.rgba.len() as u64).sum();
         // A picture that is missing or broken costs colour, not the scene.
-        let decoded = bytes
-            .map_err(|e| e.to_string())
-            .and_then(|bytes| decode(&bytes).map_err(|e| format!("{place}: {e}")));
+        let decoded = bytes.map_err(|e| e.to_string()).and_then(|bytes| {
+            decode(&bytes, MAX_PIXELS - decoded_so_far).map_err(|e| format!("{place}: {e}"))
+        });
         let id = match decoded {
             Ok(image) => {
                 let rgba = image.into_rgba8();
@@ -176,15 +179,34 @@ fn tex_coords(info: &Info) -> TexCoords {
     }
 }
 
-fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let mut reader =
-        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+fn decode(bytes: &[u8], max_pixels: u64) -> Result<DynamicImage, String> {
+    let open = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = open().map_err(|e| e.to_string())?;
     if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
         return Err("is neither PNG nor JPEG".into());
+    }
+    let dimensions = open().map_err(|e| e.to_string())?.into_dimensions();
+    let (width, height) = dimensions.map_err(|e| e.to_string())?;
+    if u64::from(width) * u64::from(height) > max_pixels {
+        return Err(format!("{width}x{height} pixels exceed {MAX_PIXELS} for all images together"));
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_IMAGE_SIDE);
     limits.max_image_height = Some(MAX_IMAGE_SIDE);
     reader.limits(limits);
     reader.decode().map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_have_a_budget() {
+        let mut png = Cursor::new(Vec::new());
+        DynamicImage::new_rgb8(7, 5).write_to(&mut png, ImageFormat::Png).unwrap();
+        let png = png.into_inner();
+        assert_eq!(decode(&png, 35).unwrap().width(), 7);
+        assert!(decode(&png, 34).unwrap_err().starts_with("7x5 pixels exceed"));
+    }
 }
