@@ -66,6 +66,8 @@ pub struct SurfaceError {
 
 /// The pieces of a map's projection at a point.
 pub(crate) struct Local {
+    /// (s, t, depth).
+    pub shadow: DVec3,
     /// Fourth coordinate of the projection.
     pub w: f64,
     /// Unit vector along the beam, away from the light.
@@ -89,17 +91,18 @@ impl Local {
         if h_w <= 0.0 {
             return None;
         }
-        let t_value = t.dot(h) / h_w;
+        let shadow = DVec3::new(s.dot(h), t.dot(h), depth.dot(h)) / h_w;
         let gradient = |row: DVec4, value: f64| (row.xyz() - w.xyz() * value) / h_w;
-        let row_derivative = map.rows.row_derivative(t_value);
+        let row_derivative = map.rows.row_derivative(shadow.y);
         let beam = map.beam_direction(p)?;
         Some(Self {
+            shadow,
             w: h_w,
             beam,
-            grad_s: gradient(s, s.dot(h) / h_w) * f64::from(map.resolution[0]),
-            grad_t: gradient(t, t_value) * (f64::from(map.resolution[1]) * row_derivative),
+            grad_s: gradient(s, shadow.x) * f64::from(map.resolution[0]),
+            grad_t: gradient(t, shadow.y) * (f64::from(map.resolution[1]) * row_derivative),
             row_derivative,
-            depth_per_metre: gradient(depth, depth.dot(h) / h_w).dot(beam),
+            depth_per_metre: gradient(depth, shadow.z).dot(beam),
         })
     }
 

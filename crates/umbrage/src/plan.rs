@@ -186,18 +186,17 @@ impl ShadowMap {
     /// without a normal.
     pub fn receiver(&self, world_position: DVec3, world_normal: DVec3) -> Option<Receiver> {
         let local = world_position - self.origin;
-        let jacobian = (!self.is_empty()).then(|| Local::at(self, local))??;
-        let p = self.project(world_position)?;
+        let here = (!self.is_empty()).then(|| Local::at(self, local))??;
         let world_normal = world_normal.try_normalize()?;
         // In shadow space the plane's covector is the world's times the inverse matrix.
         let plane = world_normal.extend(-world_normal.dot(local));
         let shadow_plane = self.local_from_shadow.transpose() * plane;
         let slope = -shadow_plane.xy() / shadow_plane.z;
         Some(Receiver {
-            st: p.truncate(),
-            depth: p.z,
+            st: here.shadow.truncate(),
+            depth: here.shadow.z,
             slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
-            half_texel: 0.5 * jacobian.footprint().longest() * jacobian.depth_per_metre,
+            half_texel: 0.5 * here.footprint().longest() * here.depth_per_metre,
         })
     }
 

@@ -170,15 +170,17 @@ impl Scratch {
         if options.warp == Warp::Log && nu > 1e-9 {
             map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
         }
-        finish(map, family.homography(nu, covered));
         // Under a spot light `adaptive` has chosen by samples. The promise not to be worse than
         // `uniform` is kept by looking.
-        if options.warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0 {
-            let adapted = map.storage_factor;
+        let may_be_worse =
+            options.warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0;
+        let uniform = may_be_worse.then(|| {
             finish(map, family.homography(0.0, covered));
-            if adapted < map.storage_factor {
-                finish(map, family.homography(nu, covered));
-            }
+            map.storage_factor
+        });
+        finish(map, family.homography(nu, covered));
+        if uniform.is_some_and(|uniform| map.storage_factor >= uniform) {
+            finish(map, family.homography(0.0, covered));
         }
     }
 }

@@ -39,11 +39,11 @@ pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective
 
 /// The quantity to make small.
 fn cost(family: &OnePoint, seen: &[Seen], objective: Objective, nu: f64) -> f64 {
-    let per_z = nu / family.mu;
+    // One pass for the extent and the errors: planning spends its time here.
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut s, mut t, mut area) = (0f64, 0f64, 0f64);
     for p in seen {
-        let w = 1.0 + per_z * (p.xz.y - family.z0);
+        let w = family.w(nu, p.xz.y);
         let x = (p.xz.x - family.center_x) / w;
         (lo, hi) = (lo.min(x), hi.max(x));
         let (at_s, at_t) = (p.base * w, p.height * w * w);

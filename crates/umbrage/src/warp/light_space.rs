@@ -27,7 +27,7 @@ impl LightSpace {
     /// amid what is seen.
     pub(crate) fn following_view(light: &Light, camera: &Camera, middle: DVec3) -> Self {
         let view = camera.forward();
-        let Base { direction, apex } = Base::of(light, camera);
+        let (direction, apex) = direction_and_apex(light, camera);
         let (beam, slope) = match apex {
             None => (direction, view),
             Some(apex) => {
@@ -54,7 +54,7 @@ impl LightSpace {
 
     /// Light space with an orientation that depends on the light alone.
     pub(crate) fn fixed(light: &Light, camera: &Camera) -> Self {
-        let Base { direction, apex } = Base::of(light, camera);
+        let (direction, apex) = direction_and_apex(light, camera);
         let [_, z] = perpendicular_pair(direction);
         Self::new(direction, apex, z, 0.0, 0.0)
     }
@@ -102,18 +102,10 @@ impl LightSpace {
     }
 }
 
-struct Base {
-    direction: DVec3,
-    apex: Option<DVec3>,
-}
-
-impl Base {
-    fn of(light: &Light, camera: &Camera) -> Self {
-        match *light {
-            Light::Directional { direction } => Self { direction, apex: None },
-            Light::Spot(spot) => {
-                Self { direction: spot.direction, apex: Some(spot.position - camera.eye()) }
-            }
-        }
+/// The way a light shines, and the local position of a spot light.
+fn direction_and_apex(light: &Light, camera: &Camera) -> (DVec3, Option<DVec3>) {
+    match *light {
+        Light::Directional { direction } => (direction, None),
+        Light::Spot(spot) => (spot.direction, Some(spot.position - camera.eye())),
     }
 }

@@ -82,7 +82,7 @@ impl OnePoint {
 
     /// w relative to the near plane's.
     fn w(&self, nu: f64, z: f64) -> f64 {
-        1.0 + nu * ((z - self.z0) / self.mu)
+        1.0 + nu / self.mu * (z - self.z0)
     }
 
     /// Range of x/w over the points seen.
