@@ -145,8 +145,7 @@ fn trace(view: &View<'_>, contenders: &mut [Contender<'_>], progress: &Progress)
         for contender in contenders.iter_mut() {
             progress.stage(format!("{}: picture", contender.technique.spec));
             let start = Instant::now();
-            let visibility =
-                band.map(|s| contender.reference.visibility(view.camera(), s), &advance);
+            let visibility = band.map(|s| contender.reference.visibility(0, s), &advance);
             *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
             contender.shadowed.push(view, &band, &visibility);
             contender.texels.push(view, &band, contender.plan, &contender.reference);
@@ -251,6 +250,9 @@ fn light_info(lamp: &Lamp) -> LightInfo {
             half_angle: spot.half_angle_rad.to_degrees(),
             range: spot.range,
         },
+        Light::Point(point) => {
+            LightInfo::Point { name, position: point.position.to_array(), range: point.range }
+        }
     }
 }
 

@@ -66,7 +66,7 @@ impl Default for Lookup {
 impl Lookup {
     fn of(plan: &Plan, reference: &Reference<'_>, camera: &Camera, sample: &Sample) -> Self {
         let surface = &sample.surface;
-        let Some(place) = reference.texel(camera, surface.position) else {
+        let Some(place) = reference.texel(0, surface.position) else {
             return Self::default();
         };
         let error =
@@ -153,7 +153,7 @@ pub(crate) fn plan(
     let mut planner = Planner::new();
     let mut plan = || {
         let start = Instant::now();
-        let plan = planner.plan(camera, light, bounds, &technique.options);
+        let plan = planner.plan(camera, &[*light], bounds, &technique.options);
         let ms = milliseconds(start);
         plan.map(|p| (p.clone(), ms)).map_err(|e| crate::setup::option_error(&e))
     };

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let bounds = scene.map_or_else(Bounds::default, |s| Bounds::of_scene(s.bounds()));
     let mut planner = Planner::new();
     let plan = planner
-        .plan(&onlooker.camera, &lamp.light, &bounds, &args.shadows.options)
+        .plan(&onlooker.camera, &[lamp.light], &bounds, &args.shadows.options)
         .map_err(|e| option_error(&e))?;
     if args.json {
         if plan.maps.iter().all(ShadowMap::is_empty) {
@@ -75,7 +75,7 @@ impl From<&umbrage::Plan> for PlanJson {
             maps: maps.collect(),
             storage_factor: plan.storage_factor(),
             texels: plan.texels(),
-            theta_deg: plan.theta_rad.to_degrees(),
+            theta_deg: plan.lights[0].theta_rad.to_degrees(),
         }
     }
 }
@@ -104,7 +104,7 @@ fn table(plan: &umbrage::Plan, onlooker: &Onlooker, args: &args::Plan) -> String
         let _ = writeln!(text, "{l}");
     };
     line(format_args!("shadows         {}", args.shadows.spec));
-    line(format_args!("view and light  {:.2}° apart", plan.theta_rad.to_degrees()));
+    line(format_args!("view and light  {:.2}° apart", plan.lights[0].theta_rad.to_degrees()));
     line(format_args!("texels          {}", plan.texels()));
     line(format_args!("storage factor  {:.6}", plan.storage_factor()));
     for (i, map) in plan.maps.iter().enumerate() {

@@ -72,7 +72,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
             layers.truth.push(&view, &band, &truth);
         }
         if let Some(reference) = &reference {
-            let visibility = band.map(|s| reference.visibility(&camera, s), &advance);
+            let visibility = band.map(|s| reference.visibility(0, s), &advance);
             layers.technique.push(&view, &band, &visibility);
             layers.texels.push(&view, &band, &plan, reference);
             if args.aov == Aov::Color && kind == PictureKind::Exr {

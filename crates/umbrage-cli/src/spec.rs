@@ -86,7 +86,7 @@ impl Technique {
             TexelSize::Side(n) => Size::Budget(u64::from(n).pow(2)),
             TexelSize::Exact(size) => Size::Exact(size),
         };
-        let options = Options { warp: spec.warp, size, max_side: MAX_SIDE };
+        let options = Options { warp: spec.warp, size, max_side: MAX_SIDE, ..Options::default() };
         Ok(Self { spec, options, filter })
     }
 }

@@ -67,6 +67,16 @@ pub enum LightInfo {
         /// Distance along the axis where light ends, metres.
         range: f64,
     },
+    /// Light from one point in all directions.
+    Point {
+        /// The light's name in the scene's file, if it is from there.
+        #[serde(default)]
+        name: Option<String>,
+        /// World position, metres.
+        position: [f64; 3],
+        /// Distance where light ends, metres.
+        range: f64,
+    },
 }
 
 /// How the truth was made.

@@ -25,7 +25,7 @@
 //! let light = Light::Directional { direction: glam::dvec3(1.0, -1.0, 0.5) };
 //! let mut planner = Planner::new();
 //! let bounds = Bounds::of_scene(scene.bounds());
-//! let plan = planner.plan(&camera, &light, &bounds, &Options::default())?;
+//! let plan = planner.plan(&camera, &[light], &bounds, &Options::default())?;
 //!
 //! let quietly = |_rows: u64| {};
 //! let reference = Reference::render(&tracer, plan, Filter::pcf(3)?, &quietly)?;
@@ -34,7 +34,7 @@
 //! for rows in view.bands() {
 //!     let band = view.band(rows, &quietly);
 //!     let truth = band.map(|sample| view.truth(sample), &quietly);
-//!     let visibility = band.map(|sample| reference.visibility(&camera, sample), &quietly);
+//!     let visibility = band.map(|sample| reference.visibility(0, sample), &quietly);
 //!     assert_eq!(truth.len(), visibility.len());
 //!     pixels.extend(shade::picture(&view, &band, &visibility));
 //! }

@@ -2,7 +2,7 @@ use crate::{Error, Progress, Ray, Sample, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use umbrage::visibility::{Filter, texel_coordinates, visibility};
-use umbrage::{Camera, Plan, ShadowMap};
+use umbrage::{Plan, ShadowMap};
 
 /// A shadow map's depths, each found by a ray through its texel's centre.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,32 +127,33 @@ impl<'a> Reference<'a> {
         &self.maps
     }
 
-    /// How much of the light the shadow maps let through to a sample, in [0, 1]; 0 for surfaces that
-    /// face away from it, 1 for those that no map holds.
-    pub fn visibility(&self, camera: &Camera, sample: &Sample) -> f32 {
+    /// How much of one of the plan's lights the shadow maps let through to a sample, in [0, 1]; 0 for
+    /// surfaces that face away from it, 1 for those that no map serves. Where slices overlap, their
+    /// maps' answers blend.
+    pub fn visibility(&self, light: usize, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
         }
         let surface = &sample.surface;
-        let Some(MapTexel { map: index, .. }) = self.texel(camera, surface.position) else {
-            return 1.0;
-        };
-        let map = &self.plan.maps[index];
-        map.receiver(surface.position, surface.geometric_normal).map_or(1.0, |receiver| {
-            visibility(map, self.filter, &receiver, |i, j| self.maps[index].texel(i, j))
-        })
+        let (mut sum, mut shares) = (0.0, 0.0);
+        for (index, share) in self.plan.lookup(light, surface.position) {
+            let map = &self.plan.maps[index];
+            let value = map.receiver(surface.position, surface.geometric_normal).map_or(1.0, |r| {
+                visibility(map, self.filter, &r, |i, j| self.maps[index].texel(i, j))
+            });
+            sum += share * f64::from(value);
+            shares += share;
+        }
+        if shares > 0.0 { (sum / shares) as f32 } else { 1.0 }
     }
 
-    /// The first of the plan's maps that serves a point's depth and holds it, and where in it the
-    /// point lies; `None` if no map does.
-    pub fn texel(&self, camera: &Camera, world_position: DVec3) -> Option<MapTexel> {
-        self.plan.maps.iter().enumerate().find_map(|(index, map)| {
-            if !map.serves(camera, world_position) {
-                return None;
-            }
-            let st = map.project(world_position)?.truncate();
-            let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
-            is_inside.then(|| MapTexel { map: index, texel: texel_coordinates(map, st) })
-        })
+    /// The map that has the largest share in a point under one of the plan's lights, and where in it
+    /// the point lies; `None` if no map serves it.
+    pub fn texel(&self, light: usize, world_position: DVec3) -> Option<MapTexel> {
+        let maps = self.plan.lookup(light, world_position);
+        let (index, _) = maps.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let map = &self.plan.maps[index];
+        let st = map.project(world_position)?.truncate();
+        Some(MapTexel { map: index, texel: texel_coordinates(map, st) })
     }
 }

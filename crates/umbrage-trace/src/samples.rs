@@ -2,7 +2,7 @@ use crate::{Error, Progress, Ray, Surface, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
-use umbrage::{Camera, Light, SpotLight};
+use umbrage::{Camera, Light, PointLight, SpotLight};
 
 /// Samples held at a time, about: some 100 MB.
 const BAND_SAMPLES: u64 = 1 << 19;
@@ -128,6 +128,8 @@ impl<'a> View<'a> {
             Light::Directional { direction } => (-direction, f64::INFINITY),
             Light::Spot(spot) if spot_depth(&spot, position) < spot.near => return 1.0,
             Light::Spot(spot) => (spot.position - position, 1.0),
+            Light::Point(point) if cube_depth(&point, position) < point.near => return 1.0,
+            Light::Point(point) => (point.position - position, 1.0),
         };
         let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
         f32::from(u8::from(!is_dark))
@@ -204,7 +206,13 @@ fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
             spot_depth(spot, position) <= spot.range
                 && -axis.dot(to_light) >= spot.half_angle_rad.cos()
         }
+        Light::Point(point) => position.distance(point.position) <= point.range,
     }
+}
+
+/// Distance from a point light along the nearest axis of the world, metres.
+fn cube_depth(point: &PointLight, position: DVec3) -> f64 {
+    (position - point.position).abs().max_element()
 }
 
 /// Distance from a spot light along its axis, metres.

@@ -72,9 +72,15 @@ fn attenuation(light: &Light, position: DVec3) -> f32 {
             // Range counts along the axis, as for what is lit at all.
             let axis = spot.direction.normalize_or_zero();
             let relative = axis.dot(position - spot.position) / spot.range;
-            (1.0 - relative.powi(4)).max(0.0).powi(2) as f32
+            window(relative)
         }
+        Light::Point(point) => window(position.distance(point.position) / point.range),
     }
+}
+
+/// 1 at the lamp, 0 where its range ends.
+fn window(relative_distance: f64) -> f32 {
+    (1.0 - relative_distance.powi(4)).max(0.0).powi(2) as f32
 }
 
 /// Linear colour of the sky at a point of the picture, pixels.
@@ -90,7 +96,7 @@ pub fn sky(light: &Light, camera: &Camera, pixel: DVec2) -> Vec3 {
         Light::Directional { direction: travel } => {
             (-travel.normalize_or_zero().dot(direction)).max(0.0) as f32
         }
-        Light::Spot(_) => 0.0,
+        Light::Spot(_) | Light::Point(_) => 0.0,
     };
     gradient + GLOW * glow.powi(6)
 }

@@ -69,10 +69,11 @@ fn a_real_level_comes_out_right() {
     let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());
     let options = Options { size: Size::Budget(2048 * 2048), ..Options::default() };
     let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &light, &Bounds::of_scene(tracer.bounds()), &options).unwrap();
+    let plan =
+        planner.plan(&camera, &[light], &Bounds::of_scene(tracer.bounds()), &options).unwrap();
     for filter in [Filter::Hard, Filter::pcf(2).unwrap()] {
         let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
-        let lit = band.map(|s| reference.visibility(&camera, s), &nobody);
+        let lit = band.map(|s| reference.visibility(0, s), &nobody);
         let lit = band.means_facing(&lit, camera.far());
         let pairs = truth.iter().zip(&lit).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
         let (wrong, all) = pairs.fold((0, 0), |(wrong, all), (truth, lit)| {

@@ -33,7 +33,7 @@ fn plan(c: &mut Criterion) {
         let mut planner = Planner::new();
         group.bench_function(name, |b| {
             b.iter(|| {
-                planner.plan(black_box(&camera), &light, &bounds, &options).unwrap().maps.len()
+                planner.plan(black_box(&camera), &[light], &bounds, &options).unwrap().maps.len()
             });
         });
     }

@@ -47,9 +47,11 @@ mod worst;
 pub use bounds::{Aabb, Bounds, Plane};
 pub use camera::{Camera, ClipDepth, LookAt};
 pub use error::Error;
-pub use light::{Light, SpotLight};
-pub use options::{Objective, Options, Size, Warp};
-pub use plan::{Beam, MapError, Plan, Receiver, Rows, ShadowMap};
+pub use light::{Light, PointLight, SpotLight};
+pub use options::{Faces, Objective, Options, Partition, Size, Splits, Warp};
+pub use plan::{
+    Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap,
+};
 pub use planner::Planner;
 
 /// The README's examples are tests.

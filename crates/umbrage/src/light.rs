@@ -1,6 +1,7 @@
 use crate::bounds::Plane;
 use crate::error::{Error, check, check_position, unit};
 use crate::math::perpendicular_pair;
+use crate::plan::CubeSide;
 use glam::DVec3;
 
 /// A light that casts shadows.
@@ -13,6 +14,22 @@ pub enum Light {
     },
     /// A cone of light from one point.
     Spot(SpotLight),
+    /// Light from one point in all directions.
+    Point(PointLight),
+}
+
+/// Light from one point in all directions. Its maps are those of six spot lights that look through the
+/// sides of a cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// World space, metres.
+    pub position: DVec3,
+    /// Distance from the light, measured along the nearest axis of the world, at which shadows begin,
+    /// metres, ≥ 1e-12. Receivers nearer than this get no shadow; casters nearer than this cast onto
+    /// those beyond.
+    pub near: f64,
+    /// Distance at which light ends, metres, > `near`.
+    pub range: f64,
 }
 
 /// A cone of light from one point.
@@ -31,21 +48,6 @@ pub struct SpotLight {
     pub range: f64,
 }
 
-impl SpotLight {
-    /// Corners of the pyramid frustum around the cone, relative to `origin` (world space). The
-    /// light's direction must have unit length.
-    pub(crate) fn corners(&self, origin: DVec3) -> [DVec3; 8] {
-        let apex = self.position - origin;
-        let (a, b) = perpendicular_pair(self.direction).into();
-        let slope = self.half_angle_rad.tan();
-        std::array::from_fn(|i| {
-            let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
-            let depth = if i >> 2 & 1 == 1 { self.range } else { self.near };
-            apex + (self.direction + a * sign(0) + b * sign(1)) * depth
-        })
-    }
-}
-
 impl Light {
     /// Unit vector from a world point towards the light. At a spot light's own position the
     /// direction against its axis.
@@ -55,56 +57,139 @@ impl Light {
             Self::Spot(spot) => (spot.position - world_position)
                 .try_normalize()
                 .unwrap_or_else(|| -spot.direction.normalize_or_zero()),
+            Self::Point(point) => {
+                (point.position - world_position).try_normalize().unwrap_or(DVec3::Y)
+            }
         }
     }
 
-    /// Planes around all that a spot light can shine on, relative to `origin` (world space); none for
-    /// directional lights. The light's direction must have unit length.
-    pub(crate) fn frustum(&self, origin: DVec3) -> Option<[Plane; 6]> {
-        let Self::Spot(spot) = self else { return None };
-        let apex = spot.position - origin;
-        let axis = spot.direction;
-        let (sin, cos) = spot.half_angle_rad.sin_cos();
-        let (a, b) = perpendicular_pair(axis).into();
-        let side = |d: DVec3| Plane::through(apex, axis * sin + d * cos);
-        Some([
-            side(a),
-            side(-a),
-            side(b),
-            side(-b),
-            Plane::through(apex + axis * spot.near, axis),
-            Plane::through(apex + axis * spot.range, -axis),
-        ])
+    /// The light as lights that one map can look from: a point light as the six pyramids of a cube,
+    /// any other as itself. The light must be checked.
+    pub(crate) fn lamps(self) -> impl Iterator<Item = (Option<CubeSide>, Lamp)> {
+        let is_point = matches!(self, Self::Point(_));
+        (0..if is_point { 6 } else { 1 }).map(move |i| {
+            let side = is_point.then(|| CubeSide::ALL[i]);
+            let lamp = match self {
+                Self::Directional { direction } => Lamp::Directional { direction },
+                Self::Spot(SpotLight { position, direction, half_angle_rad, near, range }) => {
+                    Lamp::Pyramid { position, direction, slope: half_angle_rad.tan(), near, range }
+                }
+                Self::Point(PointLight { position, near, range }) => {
+                    let direction = side.map_or(DVec3::Y, CubeSide::direction);
+                    Lamp::Pyramid { position, direction, slope: 1.0, near, range }
+                }
+            };
+            (side, lamp)
+        })
     }
 
     /// The same light with unit directions, or what is wrong with it.
     pub(crate) fn checked(&self) -> Result<Self, Error> {
+        let check_point = |position: DVec3, near: f64, range: f64| {
+            check_position(position, "light.position")?;
+            check(near >= 1e-12 && near.is_finite(), "light.near", || {
+                format!("must be finite and at least 1e-12, is {near}")
+            })?;
+            check(range > near && range <= 1e12, "light.range", || {
+                format!("must exceed light.near ({near}) and be at most 1e12, is {range}")
+            })
+        };
         match *self {
             Self::Directional { direction } => {
                 Ok(Self::Directional { direction: unit(direction, "light.direction")? })
             }
             Self::Spot(spot) => {
-                check_position(spot.position, "light.position")?;
+                check_point(spot.position, spot.near, spot.range)?;
                 let max = 85f64.to_radians();
                 check(
                     spot.half_angle_rad > 0.0 && spot.half_angle_rad <= max,
                     "light.half_angle_rad",
                     || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
                 )?;
-                check(spot.near >= 1e-12 && spot.near.is_finite(), "light.near", || {
-                    format!("must be finite and at least 1e-12, is {}", spot.near)
-                })?;
-                check(spot.range > spot.near && spot.range <= 1e12, "light.range", || {
-                    format!(
-                        "must exceed light.near ({}) and be at most 1e12, is {}",
-                        spot.near, spot.range
-                    )
-                })?;
-                Ok(Self::Spot(SpotLight {
-                    direction: unit(spot.direction, "light.direction")?,
-                    ..spot
-                }))
+                let direction = unit(spot.direction, "light.direction")?;
+                Ok(Self::Spot(SpotLight { direction, ..spot }))
+            }
+            Self::Point(point) => {
+                check_point(point.position, point.near, point.range).map(|()| *self)
             }
         }
+    }
+}
+
+impl CubeSide {
+    /// All six.
+    pub const ALL: [Self; 6] =
+        [Self::PosX, Self::NegX, Self::PosY, Self::NegY, Self::PosZ, Self::NegZ];
+
+    /// The way it looks, unit vector.
+    pub fn direction(self) -> DVec3 {
+        match self {
+            Self::PosX => DVec3::X,
+            Self::NegX => DVec3::NEG_X,
+            Self::PosY => DVec3::Y,
+            Self::NegY => DVec3::NEG_Y,
+            Self::PosZ => DVec3::Z,
+            Self::NegZ => DVec3::NEG_Z,
+        }
+    }
+}
+
+/// A light that one map can look from, with a unit direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Lamp {
+    Directional {
+        direction: DVec3,
+    },
+    /// What shines out of one point into a pyramid with a square base: `slope` is half the base's width
+    /// over the height.
+    Pyramid {
+        position: DVec3,
+        direction: DVec3,
+        slope: f64,
+        near: f64,
+        range: f64,
+    },
+}
+
+impl Lamp {
+    /// The way it shines, and the position of a pyramid's apex relative to `origin` (world space).
+    pub(crate) fn direction_and_apex(&self, origin: DVec3) -> (DVec3, Option<DVec3>) {
+        match *self {
+            Self::Directional { direction } => (direction, None),
+            Self::Pyramid { position, direction, .. } => (direction, Some(position - origin)),
+        }
+    }
+
+    /// The four sides of a pyramid, then its near and far end, relative to `origin` (world space); none
+    /// for directional lights.
+    pub(crate) fn frustum(&self, origin: DVec3) -> Option<[Plane; 6]> {
+        let Self::Pyramid { position, direction: axis, slope, near, range } = *self else {
+            return None;
+        };
+        let apex = position - origin;
+        let (a, b) = perpendicular_pair(axis).into();
+        let side = |d: DVec3| Plane::through(apex, (axis * slope + d).normalize());
+        Some([
+            side(a),
+            side(-a),
+            side(b),
+            side(-b),
+            Plane::through(apex + axis * near, axis),
+            Plane::through(apex + axis * range, -axis),
+        ])
+    }
+
+    /// Corners of a pyramid between its near and far end, relative to `origin` (world space); none for
+    /// directional lights.
+    pub(crate) fn corners(&self, origin: DVec3) -> Option<[DVec3; 8]> {
+        let Self::Pyramid { position, direction, slope, near, range } = *self else {
+            return None;
+        };
+        let (a, b) = perpendicular_pair(direction).into();
+        Some(std::array::from_fn(|i| {
+            let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
+            let depth = if i >> 2 & 1 == 1 { range } else { near };
+            position - origin + (direction + a * sign(0) + b * sign(1)) * depth
+        }))
     }
 }

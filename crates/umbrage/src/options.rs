@@ -1,32 +1,39 @@
 use crate::error::{Error, check};
+use crate::plan::Face;
 
 /// How to lay out a light's shadow maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How texels are spread over what the camera sees.
+    /// How texels are spread over what each map serves.
     pub warp: Warp,
+    /// Which maps there are.
+    pub partition: Partition,
     /// How many texels there are.
     pub size: Size,
     /// The longest side that the device allows a texture, texels, 1 ..= 65536.
     pub max_side: u32,
+    /// Sides of maps are multiples of this, texels, 1 ..= `max_side`.
+    pub align: u32,
 }
 
 impl Default for Options {
-    /// `adaptive`, 1024² texels, sides up to WebGPU's guaranteed 8192.
+    /// One `adaptive` map, 1024² texels, sides up to WebGPU's guaranteed 8192.
     fn default() -> Self {
         Self {
             warp: Warp::Adaptive(Objective::Storage),
+            partition: Partition::default(),
             size: Size::Budget(1024 * 1024),
             max_side: 8192,
+            align: 1,
         }
     }
 }
 
-/// How texels are spread over what the camera sees.
+/// How texels are spread over what a map serves.
 ///
-/// All but `Unfocused`, `Uniform` and `Psm` are one-point perspectives along light space's z axis and
+/// All but `Unfocused`, `Stable`, `Uniform` and `Psm` are one-point perspectives along light space's z axis and
 /// differ in λ alone, the distance from the centre of projection to the near plane. All but
-/// `Unfocused` and `Lambda` become `Uniform` smoothly as the view turns into the light. Along the light
+/// `Unfocused`, `Stable` and `Lambda` become `Uniform` smoothly as the view turns into the light. Along the light
 /// itself z has no direction to follow: as the view sweeps past, the map turns half around within
 /// the angle by which it misses, `Uniform`'s too.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +42,12 @@ pub enum Warp {
     /// One even map around all of the scene's bounds, whatever the camera sees: where everyone
     /// starts. Without bounds, around the view frustum's bounding sphere.
     Unfocused,
+    /// An even map that stands still in the world: its texels keep their places and their size however
+    /// the camera moves or turns, so that shadows do not shimmer. It covers the bounding sphere of its
+    /// part of the view frustum, whatever receivers there are, and moves by whole texels. Under spot
+    /// and point lights it covers all that the light shines on. Not for partitions by face, nor with
+    /// [`Splits::Fitted`]; a map needs at least 2 × 2 texels.
+    Stable,
     /// An even map focused on the receivers that the camera sees.
     Uniform,
     /// Perspective shadow maps (Stamminger and Drettakis 2002): the map looks from the light at the
@@ -74,20 +87,88 @@ pub enum Objective {
     Area,
 }
 
+/// How what the camera sees is divided among maps. The number of maps depends on nothing else, but for
+/// the lights' number and kind; those that have nothing to serve are empty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Partition {
+    /// Slices along the view, 1 ..= [`MAX_SLICES`](Self::MAX_SLICES).
+    pub slices: u32,
+    /// Where slices meet.
+    pub splits: Splits,
+    /// How far each slice reaches into the next one, as a share of its own length, 0 ..= 1. There
+    /// [`Plan::lookup`](crate::Plan::lookup) fades from one map to the next.
+    pub overlap: f64,
+    /// Whether the view frustum's faces get maps of their own.
+    pub faces: Faces,
+}
+
+impl Partition {
+    /// The largest number of slices.
+    pub const MAX_SLICES: usize = 16;
+
+    /// This many self-similar slices.
+    pub fn slices(slices: u32) -> Self {
+        Self { slices, ..Self::default() }
+    }
+}
+
+/// One map for all.
+impl Default for Partition {
+    fn default() -> Self {
+        Self { slices: 1, splits: Splits::SelfSimilar, overlap: 0.0, faces: Faces::Whole }
+    }
+}
+
+/// Where slices along the view meet. n and f are the nearest and farthest view distance of the
+/// receivers seen; for [`Warp::Stable`] the camera's own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Splits {
+    /// At n (f/n)^(i/K): slices are alike but for their size (Lloyd et al. 2006, Eqs. 15, 16).
+    SelfSimilar,
+    /// A blend of even slices (0) and self-similar ones (1): the `practical` scheme of parallel-split
+    /// shadow maps (Zhang et al. 2006).
+    Practical(f64),
+    /// At these distances, metres, ascending; as many as there are slices less one, the rest is ignored.
+    At([f64; Partition::MAX_SLICES - 1]),
+    /// Where every slice's map needs as many texels as the next for the same error, by the errors over
+    /// the receivers really there.
+    Fitted,
+}
+
+/// Whether the view frustum's faces, as seen from the light, get maps of their own (Lloyd et al. 2006,
+/// §5.1): its front faces where the light comes from behind the viewer, else its back faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Faces {
+    /// No: maps serve the frustum as a whole.
+    #[default]
+    Whole,
+    /// The four side faces, each cut into slices, and the near face: 4 K + 1 maps.
+    SidesAndNear,
+    /// The four side faces alone, reaching to the eye to cover the near face: 4 K maps.
+    Sides,
+}
+
 /// How many texels a plan has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
-    /// At most this many texels in all, 1 ..= 2³², divided between s and t so that the largest
-    /// errors in both are equal (Lloyd et al. 2006, Eqs. 13, 14).
+    /// At most this many texels in all, 1 ..= 2³² and at least one for each map, divided among maps, and
+    /// in each between s and t, so that the largest errors of all are equal (Lloyd et al. 2006, Eqs. 13, 14).
     Budget(u64),
     /// Every map has exactly this size, texels in s and t.
     Exact([u32; 2]),
+    /// The fewest texels with which no map's largest error, in the worst direction, exceeds this many
+    /// pixels per texel, > 0: the critical resolution if it is 1.
+    MaxError(f64),
 }
 
 impl Options {
     pub(crate) fn check(&self) -> Result<(), Error> {
         check((1..=65536).contains(&self.max_side), "options.max_side", || {
             format!("must be 1 to 65536 texels, is {}", self.max_side)
+        })?;
+        check((1..=self.max_side).contains(&self.align), "options.align", || {
+            format!("must be 1 to max_side ({}) texels, is {}", self.max_side, self.align)
         })?;
         match self.size {
             Size::Budget(texels) => {
@@ -97,27 +178,91 @@ impl Options {
             }
             Size::Exact(size) => {
                 check(
-                    size.iter().all(|n| (1..=self.max_side).contains(n)),
+                    size.iter().all(|n| (1..=self.max_side).contains(n) && n % self.align == 0),
                     "options.size",
                     || {
                         format!(
-                            "must be 1 to {} texels each way, is {}x{}",
-                            self.max_side, size[0], size[1]
+                            "must be multiples of {} from {0} to {} texels each way, is {}x{}",
+                            self.align, self.max_side, size[0], size[1]
                         )
                     },
                 )?;
+            }
+            Size::MaxError(pixels) => {
+                check(pixels > 0.0 && pixels.is_finite(), "options.size", || {
+                    format!("must be an error of more than 0 pixels per texel, is {pixels}")
+                })?;
             }
         }
         match self.warp {
             Warp::Lambda(lambda) => check(lambda > 0.0, "options.warp.lambda", || {
                 format!("must be a positive distance, is {lambda}")
-            }),
+            })?,
             Warp::Tsm { focus: Some(focus) } => {
                 check(focus > 0.0 && focus.is_finite(), "options.warp.focus", || {
                     format!("must be a positive, finite distance, is {focus}")
+                })?;
+            }
+            Warp::Stable => {
+                check(self.partition.faces == Faces::Whole, "options.partition.faces", || {
+                    "stable maps do not turn with the view: they cannot serve its faces".into()
+                })?;
+                check(self.partition.splits != Splits::Fitted, "options.partition.splits", || {
+                    "stable maps cannot be fitted to what is seen: take other splits".into()
+                })?;
+                let is_point = matches!(self.size, Size::Exact(size) if size.contains(&1));
+                check(!is_point, "options.size", || {
+                    "a stable map needs at least 2 texels each way".into()
+                })?;
+            }
+            _ => {}
+        }
+        self.partition.check()
+    }
+}
+
+impl Partition {
+    fn check(&self) -> Result<(), Error> {
+        check(
+            (1..=Self::MAX_SLICES as u32).contains(&self.slices),
+            "options.partition.slices",
+            || format!("must be 1 to {}, is {}", Self::MAX_SLICES, self.slices),
+        )?;
+        check((0.0..=1.0).contains(&self.overlap), "options.partition.overlap", || {
+            format!("must be a share of 0 to 1, is {}", self.overlap)
+        })?;
+        match self.splits {
+            Splits::Practical(blend) => {
+                check((0.0..=1.0).contains(&blend), "options.partition.splits", || {
+                    format!("must be a blend of 0 (even) to 1 (self-similar), is {blend}")
                 })
             }
-            _ => Ok(()),
+            Splits::At(distances) => {
+                let used = &distances[..self.slices as usize - 1];
+                check(
+                    used.iter().all(|d| (1e-12..=1e12).contains(d))
+                        && used.windows(2).all(|w| w[0] < w[1]),
+                    "options.partition.splits",
+                    || {
+                        format!(
+                            "must be {} ascending distances of 1e-12 to 1e12 metres, are {used:?}",
+                            used.len()
+                        )
+                    },
+                )
+            }
+            Splits::SelfSimilar | Splits::Fitted => Ok(()),
+        }
+    }
+
+    /// The faces that maps are for, in the order of the maps; `None` is the whole frustum. The near
+    /// face has one map, every other one for each slice.
+    pub(crate) fn face_list(&self) -> &'static [Option<Face>] {
+        use Face::{Bottom, Left, Near, Right, Top};
+        match self.faces {
+            Faces::Whole => &[None],
+            Faces::Sides => &[Some(Bottom), Some(Right), Some(Top), Some(Left)],
+            Faces::SidesAndNear => &[Some(Bottom), Some(Right), Some(Top), Some(Left), Some(Near)],
         }
     }
 }

@@ -1,18 +1,68 @@
 use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
-use crate::camera::Camera;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
+use std::ops::Range;
 
 /// What to render and how to look it up: the result of planning.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     /// World position of local space's origin, metres: the viewer's position.
     pub origin: DVec3,
-    /// The maps. Their number depends on the options alone, never on camera or light.
+    /// The maps, light by light. Their number depends on the options and the lights' kinds alone, never
+    /// on where camera and lights are.
     pub maps: Vec<ShadowMap>,
-    /// Angle θ between view and light direction, radians, 0 ..= π. For spot lights at the middle of
-    /// what the camera sees in its light.
+    /// What there is for each light, in their order.
+    pub lights: Vec<PlannedLight>,
+}
+
+/// One light's share of a [`Plan`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedLight {
+    /// Its maps' indices in [`Plan::maps`].
+    pub maps: Range<usize>,
+    /// Angle θ between view and light direction, radians, 0 ..= π. For spot and point lights at the
+    /// middle of what the camera sees in its light.
     pub theta_rad: f64,
+}
+
+/// Which part of what the camera sees a map is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// Index of the light.
+    pub light: usize,
+    /// Side of the cube around a point light; `None` for other lights.
+    pub side: Option<CubeSide>,
+    /// Face of the view frustum; `None`: all of it.
+    pub face: Option<Face>,
+    /// Slice along the view, from the viewer.
+    pub slice: usize,
+}
+
+/// A face of the view frustum, as in the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Face {
+    /// Below the picture.
+    Bottom,
+    /// Right of the picture.
+    Right,
+    /// Above the picture.
+    Top,
+    /// Left of the picture.
+    Left,
+    /// Before the picture.
+    Near,
+}
+
+/// A side of the cube around a point light: the direction in world space in which it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "they say it all")]
+pub enum CubeSide {
+    PosX,
+    NegX,
+    PosY,
+    NegY,
+    PosZ,
+    NegZ,
 }
 
 impl Plan {
@@ -25,6 +75,25 @@ impl Plan {
     /// error of 1 pixel per texel in s and in t (Lloyd et al. 2006, Eq. 12, whose images are square).
     pub fn storage_factor(&self) -> f64 {
         self.maps.iter().map(|m| m.storage_factor).sum()
+    }
+
+    /// The maps that answer for a world point under a light, and the share of each. There is one, two
+    /// where slices overlap, and none where nothing is served. Shares add up to 1.
+    pub fn lookup(
+        &self,
+        light: usize,
+        world_position: DVec3,
+    ) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let maps = self.lights.get(light).map_or(0..0, |l| l.maps.clone());
+        let mut left = 1.0;
+        maps.map_while(move |i| {
+            (left > 0.0).then(|| {
+                let share = self.maps[i].weight(world_position).min(left);
+                left -= share;
+                (i, share)
+            })
+        })
+        .filter(|&(_, share)| share > 0.0)
     }
 }
 
@@ -100,8 +169,17 @@ pub struct ShadowMap {
     pub rows: Rows,
     /// Texels in s and t. Both 0 if the map sees nothing ([`is_empty`](Self::is_empty)).
     pub resolution: [u32; 2],
-    /// Range along the view direction that the map serves, metres.
+    /// Which part of what the camera sees the map is for.
+    pub part: Part,
+    /// The range along the view direction that the map is for, metres. For maps of the frustum's side
+    /// faces the range on the face.
     pub split: [f64; 2],
+    /// The map serves what lies inside all of these half-spaces, in local space. Where there is a next
+    /// slice, the first of them ends this one.
+    pub cell: Vec<Plane>,
+    /// Where slices overlap, the half-space before the next slice: from its border to the first plane
+    /// of `cell` the map fades into the next one.
+    pub fade_from: Option<Plane>,
     /// Distance λ from the warp's centre of projection to its near plane, in light-space metres (for
     /// spot lights: in units of the light's image plane at unit distance). `None`: no warp.
     pub lambda: Option<f64>,
@@ -207,9 +285,15 @@ impl ShadowMap {
         !self.is_empty() && self.caster_planes.iter().all(|p| p.may_touch(local))
     }
 
-    /// Whether `camera`'s depth of this point lies in the range the map serves.
-    pub fn serves(&self, camera: &Camera, world_position: DVec3) -> bool {
-        let depth = camera.depth(world_position);
-        !self.is_empty() && (self.split[0]..=self.split[1]).contains(&depth)
+    /// How far the map answers for a point, 0 ..= 1: 0 outside what it serves, 1 inside, falling
+    /// where it fades into the next slice's map.
+    pub fn weight(&self, world_position: DVec3) -> f64 {
+        let local = world_position - self.origin;
+        if self.is_empty() || self.cell.iter().any(|p| p.distance(local) < 0.0) {
+            return 0.0;
+        }
+        let (Some(end), Some(start)) = (self.cell.first(), self.fade_from) else { return 1.0 };
+        let [left, gone] = [end.distance(local), -start.distance(local)];
+        if gone <= 0.0 { 1.0 } else { left / (left + gone) }
     }
 }

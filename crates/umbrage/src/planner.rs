@@ -5,7 +5,7 @@ use crate::casters::caster_planes;
 use crate::error::Error;
 use crate::fit::{fit, lambda, matrices};
 use crate::focus::ConvexBody;
-use crate::light::Light;
+use crate::light::{Lamp, Light};
 use crate::math::range;
 use crate::options::{Objective, Options, Warp};
 use crate::plan::{MapError, Plan, Rows, ShadowMap};
@@ -29,22 +29,24 @@ impl Planner {
         Self::default()
     }
 
-    /// Plans the shadow maps of one light for one view.
+    /// Plans the shadow maps of all `lights` for one view. They share the texels by their error.
     ///
-    /// A camera that sees none of the receivers, or none in the light, gets a plan of empty maps.
+    /// A camera that sees none of the receivers, or none in a light, gets empty maps.
     ///
     /// # Errors
     /// Names the first field of light, bounds or options that is out of its range.
     pub fn plan(
         &mut self,
         camera: &Camera,
-        light: &Light,
+        lights: &[Light],
         bounds: &Bounds,
         options: &Options,
     ) -> Result<&Plan, Error> {
         options.check()?;
         bounds.check()?;
-        let request = Request { camera, light: &light.checked()?, bounds, options };
+        let light = lights[0].checked()?;
+        let (_, lamp) = light.lamps().next().unwrap();
+        let request = Request { camera, light: &lamp, bounds, options };
         let Self { plan, body, scratch } = self;
         request.focus(body);
         plan.origin = camera.eye();
@@ -57,7 +59,8 @@ impl Planner {
             Aabb::around(body.vertices().iter().copied()).center()
         };
         let space = LightSpace::following_view(request.light, camera, middle);
-        plan.theta_rad = space.theta_rad;
+        plan.lights.clear();
+        plan.lights.push(crate::plan::PlannedLight { maps: 0..1, theta_rad: space.theta_rad });
         if !body.is_empty() {
             scratch.plan_map(map, body, &space, &request);
         }
@@ -68,7 +71,7 @@ impl Planner {
 /// Checked input.
 struct Request<'a> {
     camera: &'a Camera,
-    light: &'a Light,
+    light: &'a Lamp,
     bounds: &'a Bounds,
     options: &'a Options,
 }
@@ -89,8 +92,8 @@ impl Request<'_> {
     fn whole_scene(&self, space: &LightSpace) -> [DVec3; 8] {
         let eye = self.camera.eye();
         let scene = self.bounds.receivers.map(|r| self.bounds.casters.map_or(r, |c| r.union(c)));
-        match (self.light, scene) {
-            (Light::Spot(spot), _) => spot.corners(eye),
+        match (self.light.corners(eye), scene) {
+            (Some(corners), _) => corners,
             (_, Some(scene)) => scene.relative_to(eye).corners(),
             (_, None) => bounding_cube(self.camera, space),
         }
@@ -153,6 +156,11 @@ impl Scratch {
             map.apex = space.apex;
             map.lambda = lambda(homography, seen);
             map.split = range(seen.iter().map(|p| p.depth)).into();
+            let [near, far] = map.split;
+            map.cell = vec![
+                crate::Plane::through(camera.forward() * far, -camera.forward()),
+                crate::Plane::through(camera.forward() * near, camera.forward()),
+            ];
             // Errors at one texel decide the resolution.
             map.resolution = [1, 1];
             let [unit_s, unit_t] = unit_errors(map, body, camera);
@@ -193,7 +201,10 @@ impl ShadowMap {
             local_from_shadow: DMat4::IDENTITY,
             rows: Rows::Even,
             resolution: [0, 0],
+            part: crate::plan::Part::default(),
             split: [camera.near(), camera.near()],
+            cell: Vec::new(),
+            fade_from: None,
             lambda: None,
             error: MapError::default(),
             storage_factor: 0.0,

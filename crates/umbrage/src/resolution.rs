@@ -8,6 +8,7 @@ pub(crate) fn resolution(options: &Options, unit_s: f64, unit_t: f64) -> [u32; 2
     let budget = match options.size {
         Size::Exact(size) => return size,
         Size::Budget(texels) => texels as f64,
+        Size::MaxError(_) => todo!(),
     };
     let ratio = (unit_s / unit_t).clamp(1e-9, 1e9);
     let max = f64::from(options.max_side);

@@ -30,7 +30,7 @@ proptest! {
         // Differences of coordinates far from the origin have no digits left.
         prop_assume!(camera.eye().length() < 1e3 * camera.near().max(0.1));
         let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &config.light, &config.bounds, &options(warp)).unwrap();
+        let plan = planner.plan(&camera, &[config.light], &config.bounds, &options(warp)).unwrap();
         let map = &plan.maps[0];
         for p in config.seen_points(&numbers) {
             let shadow = map.project(p).unwrap();
@@ -92,7 +92,7 @@ proptest! {
         let (name, warp) = WARPS[pick];
         prop_assume!(config.camera.eye().length() < 1e3 * config.camera.near().max(0.1));
         let mut planner = Planner::new();
-        let plan = planner.plan(&config.camera, &config.light, &config.bounds, &options(warp)).unwrap();
+        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
         let map = &plan.maps[0];
         for p in config.seen_points(&[number]) {
             let receiver = map.receiver(p, normal).unwrap();
@@ -121,7 +121,7 @@ fn surfaces_edge_on_to_the_light_have_infinite_error() {
     .unwrap();
     let light = umbrage::Light::Directional { direction: DVec3::NEG_Y };
     let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &light, &Default::default(), &Default::default()).unwrap();
+    let plan = planner.plan(&camera, &[light], &Default::default(), &Default::default()).unwrap();
     let map = &plan.maps[0];
     let wall = map.surface_error(&camera, DVec3::new(0.0, 0.0, -5.0), DVec3::Z).unwrap();
     assert!(wall.worst > 1e9);

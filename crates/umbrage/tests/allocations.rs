@@ -74,7 +74,7 @@ fn steady_frames_do_not_allocate() {
             for light in &lights {
                 for warp in warps {
                     let options = Options { warp, ..Options::default() };
-                    planner.plan(&camera(frame), light, &bounds, &options).unwrap();
+                    planner.plan(&camera(frame), &[*light], &bounds, &options).unwrap();
                 }
             }
         }

@@ -29,9 +29,9 @@ fn sun(theta: f64) -> Light {
 }
 
 fn plan_view(camera: &Camera, theta: f64, warp: Warp) -> Plan {
-    let options = Options { warp, size: Size::Exact(RES), max_side: 4096 };
+    let options = Options { warp, size: Size::Exact(RES), max_side: 4096, ..Options::default() };
     let mut planner = Planner::new();
-    planner.plan(camera, &sun(theta), &Bounds::default(), &options).unwrap().clone()
+    planner.plan(camera, &[sun(theta)], &Bounds::default(), &options).unwrap().clone()
 }
 
 fn assert_close(measured: f64, expected: f64, tolerance: f64, what: &str) {
@@ -163,7 +163,7 @@ fn tilted_light_matches_zhang_et_al() {
         ] {
             let plan = plan_view(&camera, theta, warp);
             let map = &plan.maps[0];
-            assert_close(plan.theta_rad, theta, 1e-9, "θ");
+            assert_close(plan.lights[0].theta_rad, theta, 1e-9, "θ");
             let lambda = map.lambda.unwrap_or(1e12);
             for z in [N, 2.0, 10.0, 40.0, F] {
                 for k in [-1.0, -0.4, 0.0, 0.8, 1.0] {

@@ -67,7 +67,7 @@ fn cameras_name_what_is_wrong() {
 fn lights_bounds_and_options_name_what_is_wrong() {
     let camera = Camera::look_at(VIEW).unwrap();
     let plan = |light: Light, bounds: Bounds, options: Options| {
-        field(Planner::new().plan(&camera, &light, &bounds, &options))
+        field(Planner::new().plan(&camera, &[light], &bounds, &options))
     };
     let none = Bounds::default();
     for direction in [DVec3::ZERO, DVec3::NAN, DVec3::new(0.0, f64::INFINITY, 0.0)] {
@@ -153,10 +153,11 @@ fn odd_input_gives_sound_plans() {
                     for size in [Size::Budget(1), Size::Budget(1 << 20), Size::Exact([3, 5])] {
                         let options = Options { size, ..options(warp) };
                         let what = format!("{name} {size:?} {look:?} {light:?} {bounds:?}");
-                        let plan = planner.plan(&camera, &light, &bounds, &options).expect(&what);
+                        let plan = planner.plan(&camera, &[light], &bounds, &options).expect(&what);
                         assert_eq!(plan.maps.len(), 1);
                         assert!(
-                            plan.theta_rad.is_finite() && plan.storage_factor().is_finite(),
+                            plan.lights[0].theta_rad.is_finite()
+                                && plan.storage_factor().is_finite(),
                             "{what}"
                         );
                         let map = &plan.maps[0];
@@ -193,7 +194,8 @@ fn a_camera_that_sees_nothing_gets_an_empty_plan() {
     let behind = Aabb::new(DVec3::new(-50.0, 0.0, 50.0), DVec3::new(-40.0, 10.0, 60.0));
     for (name, warp) in WARPS {
         let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &SUN, &Bounds::of_scene(behind), &options(warp)).unwrap();
+        let plan =
+            planner.plan(&camera, &[SUN], &Bounds::of_scene(behind), &options(warp)).unwrap();
         assert!(plan.maps.iter().all(umbrage::ShadowMap::is_empty), "{name}");
         assert_eq!((plan.texels(), plan.storage_factor()), (0, 0.0));
         assert!(plan.maps[0].footprint(VIEW.target).is_none());
@@ -307,7 +309,7 @@ fn landmarks() {
     let light = Light::Directional { direction: DVec3::NEG_Y };
     for (name, warp) in WARPS {
         let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &light, &Bounds::default(), &options(warp)).unwrap();
+        let plan = planner.plan(&camera, &[light], &Bounds::default(), &options(warp)).unwrap();
         let map = &plan.maps[0];
         let at = |x: f64, y: f64, z: f64| map.project(DVec3::new(x, y, z)).unwrap();
         if warp != Warp::Unfocused {
@@ -344,7 +346,7 @@ fn casters_are_culled() {
     for light in [sun, spot] {
         for (name, warp) in WARPS {
             let mut planner = Planner::new();
-            let plan = planner.plan(&camera, &light, &Bounds::default(), &options(warp)).unwrap();
+            let plan = planner.plan(&camera, &[light], &Bounds::default(), &options(warp)).unwrap();
             let map = &plan.maps[0];
             for (center, casts) in [
                 (DVec3::new(0.0, 0.0, -50.0), true),
@@ -369,7 +371,7 @@ fn single_precision_is_enough_far_from_the_origin() {
     let camera = Camera::look_at(look).unwrap();
     for (name, warp) in WARPS {
         let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &SUN, &Bounds::default(), &options(warp)).unwrap();
+        let plan = planner.plan(&camera, &[SUN], &Bounds::default(), &options(warp)).unwrap();
         let map = &plan.maps[0];
         for depth in [0.2, 1.0, 10.0, 90.0] {
             for pixel in

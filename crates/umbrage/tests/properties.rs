@@ -20,7 +20,7 @@ proptest! {
     fn receivers_casters_and_errors(config in config(), numbers in numbers(), pick in 0..WARPS.len()) {
         let (name, warp) = WARPS[pick];
         let mut planner = Planner::new();
-        let plan = planner.plan(&config.camera, &config.light, &config.bounds, &options(warp)).unwrap();
+        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
         let map = &plan.maps[0];
         prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite(), "{name}");
         let seen = config.seen_points(&numbers);
@@ -77,7 +77,7 @@ proptest! {
     fn uniform_needs_at_least_adaptive(config in config()) {
         let mut planner = Planner::new();
         let mut storage = |warp| {
-            let plan = planner.plan(&config.camera, &config.light, &config.bounds, &options(warp)).unwrap();
+            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
             plan.storage_factor()
         };
         let uniform = storage(Warp::Uniform);
@@ -105,7 +105,7 @@ fn maxima_are_reached() {
             let mut planner = Planner::new();
             for (name, warp) in WARPS {
                 let plan = planner
-                    .plan(&config.camera, &config.light, &config.bounds, &options(warp))
+                    .plan(&config.camera, &[config.light], &config.bounds, &options(warp))
                     .unwrap();
                 let map = &plan.maps[0];
                 prop_assert!(!map.is_empty());

@@ -76,7 +76,7 @@ fn texel(planner: &mut Planner, motion: Motion, bounds: &Bounds, warp: Warp, t: 
     .unwrap();
     let light = Light::Directional { direction: frame.sun };
     let options = umbrage::Options { size: umbrage::Size::Exact([1024; 2]), ..options(warp) };
-    let plan = planner.plan(&camera, &light, bounds, &options).unwrap();
+    let plan = planner.plan(&camera, &[light], bounds, &options).unwrap();
     let map = &plan.maps[0];
     let middle = map.beam(DVec2::splat(0.5)).expect("a map that sees something");
     let footprint = map.footprint(middle.origin).unwrap();

@@ -270,6 +270,10 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
             ("shines", format!("{}, {}° to each side", vector(*direction), plain(*half_angle))),
             ("reaches", format!("{} m", significant(*range))),
         ]),
+        LightInfo::Point { name, position, range } => setup.extend([
+            ("Light", format!("{}point at {} m", named(name), vector(*position))),
+            ("reaches", format!("{} m", significant(*range))),
+        ]),
     }
     setup.push(("Truth", truth_how(report)));
     setup

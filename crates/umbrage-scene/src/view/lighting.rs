@@ -28,6 +28,7 @@ pub(super) fn lighting(
             Some(eye + direction * (sight.distance - back).max(0.0))
         })
         .collect();
+    let reaches = |p: DVec3, light: DVec3| grid.look(p, light - p).is_none_or(|s| s.distance > 1.0);
     // How good a light is, and the share of what is seen that it leaves dark.
     let judge = |light: &Light| {
         let is_lit = |p: DVec3| match light {
@@ -35,7 +36,10 @@ pub(super) fn lighting(
             Light::Spot(spot) => {
                 let to_light = spot.position - p;
                 spot.direction.angle_between(-to_light) < spot.half_angle_rad
-                    && grid.look(p, to_light).is_none_or(|s| s.distance > 1.0)
+                    && reaches(p, spot.position)
+            }
+            Light::Point(point) => {
+                p.distance(point.position) <= point.range && reaches(p, point.position)
             }
         };
         let lit: Vec<Option<bool>> = seen.iter().map(|p| p.map(is_lit)).collect();

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its share")]
 
 use glam::{DAffine3, DMat4, DVec2, DVec3, Vec2, Vec3, Vec4};
-use umbrage::{Camera, LookAt, MapError, Rows, ShadowMap};
+use umbrage::{Camera, LookAt, MapError, Part, Rows, ShadowMap};
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene};
 use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer};
 
@@ -127,6 +127,9 @@ pub(crate) fn even_map(
         local_from_shadow: shadow_from_local.inverse(),
         rows: Rows::Even,
         resolution,
+        part: Part::default(),
+        cell: Vec::new(),
+        fade_from: None,
         split: [0.0, 1e9],
         lambda: None,
         error: MapError::default(),

@@ -27,6 +27,9 @@ use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
 use std::fmt;
 
+/// How far outside [0, 1]² shadow coordinates still count as inside.
+const ROUNDING: f64 = 1e-6;
+
 /// How the texels around a point are looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -94,7 +97,9 @@ pub fn visibility(
     fetch: impl Fn(i32, i32) -> f32,
 ) -> f32 {
     let st = receiver.st;
-    let is_inside = st.cmpge(DVec2::ZERO).all() && st.cmple(DVec2::ONE).all();
+    // What is served lies in the map up to rounding, at the border of its part as well.
+    let is_inside =
+        st.cmpge(DVec2::splat(-ROUNDING)).all() && st.cmple(DVec2::splat(1.0 + ROUNDING)).all();
     if map.is_empty() || !is_inside {
         return 1.0;
     }
@@ -104,8 +109,8 @@ pub fn visibility(
     match filter {
         Filter::Hard => {
             let last = |n: u32| f64::from(n - 1);
-            let i = texel.x.floor().min(last(map.resolution[0]));
-            let j = texel.y.floor().min(last(map.resolution[1]));
+            let i = texel.x.floor().clamp(0.0, last(map.resolution[0]));
+            let j = texel.y.floor().clamp(0.0, last(map.resolution[1]));
             f32::from(u8::from(is_lit(i as i32, j as i32)))
         }
         Filter::Pcf { n } => {

@@ -1,5 +1,5 @@
 use crate::camera::Camera;
-use crate::light::Light;
+use crate::light::Lamp;
 use crate::math::perpendicular_pair;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
@@ -25,9 +25,9 @@ pub(crate) struct LightSpace {
 impl LightSpace {
     /// Light space for a view, with z following the view direction. `middle` is a local point
     /// amid what is seen.
-    pub(crate) fn following_view(light: &Light, camera: &Camera, middle: DVec3) -> Self {
+    pub(crate) fn following_view(light: &Lamp, camera: &Camera, middle: DVec3) -> Self {
         let view = camera.forward();
-        let (direction, apex) = direction_and_apex(light, camera);
+        let (direction, apex) = light.direction_and_apex(camera.eye());
         let (beam, slope) = match apex {
             None => (direction, view),
             Some(apex) => {
@@ -53,8 +53,8 @@ impl LightSpace {
     }
 
     /// Light space with an orientation that depends on the light alone.
-    pub(crate) fn fixed(light: &Light, camera: &Camera) -> Self {
-        let (direction, apex) = direction_and_apex(light, camera);
+    pub(crate) fn fixed(light: &Lamp, camera: &Camera) -> Self {
+        let (direction, apex) = light.direction_and_apex(camera.eye());
         let [_, z] = perpendicular_pair(direction);
         Self::new(direction, apex, z, 0.0, 0.0)
     }
@@ -99,13 +99,5 @@ impl LightSpace {
     /// The rows x, y, z, w as a matrix.
     pub(crate) fn light_from_local(&self) -> DMat4 {
         DMat4::from_cols(self.x, self.y, self.z, self.w).transpose()
-    }
-}
-
-/// The way a light shines, and the local position of a spot light.
-fn direction_and_apex(light: &Light, camera: &Camera) -> (DVec3, Option<DVec3>) {
-    match *light {
-        Light::Directional { direction } => (direction, None),
-        Light::Spot(spot) => (spot.direction, Some(spot.position - camera.eye())),
     }
 }

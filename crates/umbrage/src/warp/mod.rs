@@ -111,7 +111,7 @@ impl OnePoint {
         camera: &Camera,
     ) -> f64 {
         match warp {
-            Warp::Unfocused | Warp::Uniform | Warp::Psm => 0.0,
+            Warp::Unfocused | Warp::Stable | Warp::Uniform | Warp::Psm => 0.0,
             Warp::Lambda(lambda) => (self.mu / lambda).min(MAX_STRENGTH),
             Warp::Adaptive(objective) => {
                 // As the view turns into the light z swings around, and what is best for one z is

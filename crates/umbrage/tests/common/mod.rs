@@ -29,7 +29,7 @@ pub(crate) struct Config {
 }
 
 pub(crate) fn options(warp: Warp) -> Options {
-    Options { warp, size: Size::Budget(1 << 20), max_side: 1 << 16 }
+    Options { warp, size: Size::Budget(1 << 20), max_side: 1 << 16, ..Options::default() }
 }
 
 pub(crate) fn direction() -> impl Strategy<Value = DVec3> {
@@ -178,6 +178,7 @@ impl Config {
                 r.dot(spot.direction)
                     > r.length() * spot.direction.length() * spot.half_angle_rad.cos()
             }
+            Light::Point(point) => world.distance(point.position) <= point.range,
         }
     }
 
