@@ -116,6 +116,11 @@ impl Plane {
         self.normal.dot(p) + self.offset
     }
 
+    /// The half-space on the other side.
+    pub(crate) fn flipped(self) -> Self {
+        Self { normal: -self.normal, offset: -self.offset }
+    }
+
     /// Whether any point of `aabb` may lie inside.
     pub fn may_touch(self, aabb: Aabb) -> bool {
         let farthest = DVec3::select(self.normal.cmpge(DVec3::ZERO), aabb.max, aabb.min);

@@ -2,7 +2,7 @@
 
 use crate::bounds::Plane;
 use crate::focus::ConvexBody;
-use crate::warp::{LightSpace, Seen};
+use crate::warp::LightSpace;
 use glam::{DVec2, DVec3};
 
 /// Planes around all that can cast onto `body`: the body swept towards the light. Those of its
@@ -11,7 +11,6 @@ use glam::{DVec2, DVec3};
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
     body: &ConvexBody,
-    seen: &[Seen],
     space: &LightSpace,
     outline: &mut Vec<DVec2>,
 ) {
@@ -23,7 +22,7 @@ pub(crate) fn caster_planes(
     };
     let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
     planes.extend(body.planes().filter(sweeps_inwards).map(widen));
-    convex_outline(outline, seen.iter().map(|p| p.xz));
+    convex_outline(outline, body.vertices().iter().map(|&v| space.project(v).0));
     for (i, &a) in outline.iter().enumerate() {
         let b = outline[(i + 1) % outline.len()];
         // The line through a and b in the light plane, as a covector over (x, z, w) of light space,

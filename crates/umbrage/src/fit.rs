@@ -17,27 +17,47 @@ pub(crate) fn fit(homography: DMat3, seen: &[Seen]) -> DMat3 {
     DMat3::from_cols(fit(s), fit(t), w / least_w).transpose()
 }
 
+/// Which light-space y have depths 0 and 1 where w is 1, metres (for spot lights in units of light-space
+/// y): y counts from `middle`, downwards.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthRange {
+    middle: f64,
+    nearest: f64,
+    span: f64,
+}
+
+impl DepthRange {
+    /// Around `middle`, `radius` to both sides.
+    pub(crate) fn around(middle: f64, radius: f64) -> Self {
+        Self { middle, nearest: -radius, span: 2.0 * radius }
+    }
+
+    /// With 0 and 1 at the ends of what is covered.
+    pub(crate) fn of(covered: &[Seen], homography: DMat3, space: &LightSpace) -> Self {
+        let w = homography.row(2);
+        let (y0, y1) = range(covered.iter().map(|p| p.y));
+        // y counts from the middle of its range (Wimmer et al. 2004, §3.4), which keeps the perspective
+        // from tilting depth.
+        let middle = y0.midpoint(y1);
+        let depth = |p: &Seen| (middle - p.y) / w.dot(p.xz.extend(1.0));
+        let (nearest, farthest) = range(covered.iter().map(depth));
+        // A flat body across the light has no range of depth. Give it one that single precision can
+        // work with.
+        let [width, height] = [0, 1].map(|axis| {
+            let (lo, hi) = range(covered.iter().map(|p| p.xz[axis]));
+            hi - lo
+        });
+        // What a unit of x or z is worth in y, which is 1/distance for a spot light.
+        let unit = if space.apex.is_some() { y1 } else { 1.0 };
+        let span = (farthest - nearest).max(1e-3 * width.max(height) * unit);
+        Self { middle, nearest: nearest.midpoint(farthest) - span / 2.0, span }
+    }
+}
+
 /// The whole transform from local to shadow space: the homography for s, t and w, and a depth that
-/// grows linearly away from the light, divided by w, with 0 and 1 at the ends of what is covered. And
-/// its inverse.
-pub(crate) fn matrices(homography: DMat3, covered: &[Seen], space: &LightSpace) -> [DMat4; 2] {
-    let w = homography.row(2);
-    let (y0, y1) = range(covered.iter().map(|p| p.y));
-    // y counts from the middle of its range (Wimmer et al. 2004, §3.4), which keeps the perspective from
-    // tilting depth.
-    let middle = y0.midpoint(y1);
-    let depth = |p: &Seen| (middle - p.y) / w.dot(p.xz.extend(1.0));
-    let (nearest, farthest) = range(covered.iter().map(depth));
-    // A flat body across the light has no range of depth. Give it one that single precision can
-    // work with.
-    let [width, height] = [0, 1].map(|axis| {
-        let (lo, hi) = range(covered.iter().map(|p| p.xz[axis]));
-        hi - lo
-    });
-    // What a unit of x or z is worth in y, which is 1/distance for a spot light.
-    let unit = if space.apex.is_some() { y1 } else { 1.0 };
-    let span = (farthest - nearest).max(1e-3 * width.max(height) * unit);
-    let nearest = nearest.midpoint(farthest) - span / 2.0;
+/// grows linearly away from the light, divided by w. And its inverse.
+pub(crate) fn matrices(homography: DMat3, depth: DepthRange, space: &LightSpace) -> [DMat4; 2] {
+    let DepthRange { middle, nearest, span } = depth;
     // Numerators over (x, y, z, w) of light space.
     let on_plane = |row: DVec3| DVec4::new(row.x, 0.0, row.y, row.z);
     let rows = [0, 1, 2].map(|i| on_plane(homography.row(i)));

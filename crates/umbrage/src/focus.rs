@@ -57,7 +57,14 @@ impl ConvexBody {
         }
     }
 
-    fn clear(&mut self) {
+    /// Starts over with another body's shape. (`Clone::clone_from` would not keep the buffers.)
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.vertices.clone_from(&other.vertices);
+        self.faces.clone_from(&other.faces);
+        self.loops.clone_from(&other.loops);
+    }
+
+    pub(crate) fn clear(&mut self) {
         self.vertices.clear();
         self.faces.clear();
         self.loops.clear();
@@ -75,6 +82,11 @@ impl ConvexBody {
     /// Largest coordinate of any vertex, metres: how far from the eye digits have to reach.
     pub(crate) fn size(&self) -> f64 {
         range(self.vertices.iter().map(|v| v.abs().max_element())).1.max(0.0)
+    }
+
+    /// A point amid the body; `None` if it is empty.
+    pub(crate) fn middle(&self) -> Option<DVec3> {
+        (!self.is_empty()).then(|| Aabb::around(self.vertices.iter().copied()).center())
     }
 
     pub(crate) fn is_empty(&self) -> bool {

@@ -28,6 +28,7 @@
 //!   projection to its near plane, μ for the warp's depth range.
 
 pub mod aliasing;
+mod atlas;
 mod bounds;
 mod camera;
 mod casters;
@@ -37,13 +38,16 @@ mod focus;
 mod light;
 mod math;
 mod options;
+mod partition;
 mod plan;
 mod planner;
 mod resolution;
+mod stable;
 pub mod visibility;
 mod warp;
 mod worst;
 
+pub use atlas::{Atlas, AtlasTooLarge, Place, ScaleOffset};
 pub use bounds::{Aabb, Bounds, Plane};
 pub use camera::{Camera, ClipDepth, LookAt};
 pub use error::Error;

@@ -211,9 +211,11 @@ impl Options {
                     "stable maps cannot be fitted to what is seen: take other splits".into()
                 })?;
                 let is_point = matches!(self.size, Size::Exact(size) if size.contains(&1));
-                check(!is_point, "options.size", || {
-                    "a stable map needs at least 2 texels each way".into()
-                })?;
+                check(
+                    !is_point && self.max_side / self.align * self.align >= 2,
+                    "options.size",
+                    || "a stable map needs at least 2 texels each way".into(),
+                )?;
             }
             _ => {}
         }

@@ -1,16 +1,18 @@
 use crate::aliasing::Local;
-use crate::bounds::{Aabb, Bounds};
+use crate::bounds::{Bounds, Plane};
 use crate::camera::Camera;
 use crate::casters::caster_planes;
 use crate::error::Error;
-use crate::fit::{fit, lambda, matrices};
+use crate::fit::{DepthRange, fit, lambda, matrices};
 use crate::focus::ConvexBody;
 use crate::light::{Lamp, Light};
 use crate::math::range;
-use crate::options::{Objective, Options, Warp};
-use crate::plan::{MapError, Plan, Rows, ShadowMap};
-use crate::resolution::resolution;
-use crate::warp::{LightSpace, OnePoint, Seen, psm};
+use crate::options::{Faces, Objective, Options, Size, Warp};
+use crate::partition::{self, Along};
+use crate::plan::{Face, MapError, Part, Plan, PlannedLight, Rows, ShadowMap};
+use crate::resolution::{enlarged, resolutions};
+use crate::stable::{Still, bounding_sphere};
+use crate::warp::{LightSpace, OnePoint, Seen, psm, theta};
 use crate::worst::{self, worst_errors};
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
@@ -19,8 +21,38 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 #[derive(Clone, Debug, Default)]
 pub struct Planner {
     plan: Plan,
-    body: ConvexBody,
+    drafts: Vec<Draft>,
+    /// Largest errors of each map at one texel, pixels per texel; 0 if it has nothing to serve.
+    units: Vec<[f64; 2]>,
+    sizes: Vec<[u32; 2]>,
+    bodies: Bodies,
+    /// Planes around the part of a light's view that a face is for.
+    cell: Vec<Plane>,
+    /// A map that is only tried.
+    trial: ShadowMap,
     scratch: Scratch,
+}
+
+/// What a map has besides itself while it is planned.
+#[derive(Clone, Debug, Default)]
+struct Draft {
+    /// What the map serves.
+    body: ConvexBody,
+    /// Where the map stands, if that depends on its resolution.
+    still: Option<Still>,
+}
+
+/// What is seen, cut smaller step by step.
+#[derive(Clone, Debug, Default)]
+struct Bodies {
+    /// By the camera, of the receivers.
+    view: ConvexBody,
+    /// In a light.
+    lit: ConvexBody,
+    /// In the part of a face.
+    face: ConvexBody,
+    /// In a slice that is only tried.
+    slice: ConvexBody,
 }
 
 impl Planner {
@@ -29,12 +61,13 @@ impl Planner {
         Self::default()
     }
 
-    /// Plans the shadow maps of all `lights` for one view. They share the texels by their error.
+    /// Plans the shadow maps of all `lights` for one view. A budget of texels is shared among them.
     ///
     /// A camera that sees none of the receivers, or none in a light, gets empty maps.
     ///
     /// # Errors
-    /// Names the first field of light, bounds or options that is out of its range.
+    /// Names the first field of lights, bounds or options that is out of its range. The planner can
+    /// still be used.
     pub fn plan(
         &mut self,
         camera: &Camera,
@@ -44,55 +77,145 @@ impl Planner {
     ) -> Result<&Plan, Error> {
         options.check()?;
         bounds.check()?;
-        let light = lights[0].checked()?;
-        let (_, lamp) = light.lamps().next().unwrap();
-        let request = Request { camera, light: &lamp, bounds, options };
-        let Self { plan, body, scratch } = self;
-        request.focus(body);
-        plan.origin = camera.eye();
-        plan.maps.resize_with(1, || ShadowMap::empty(camera));
-        let map = &mut plan.maps[0];
-        map.clear(camera);
-        let middle = if body.is_empty() {
-            camera.forward() * camera.near()
-        } else {
-            Aabb::around(body.vertices().iter().copied()).center()
-        };
-        let space = LightSpace::following_view(request.light, camera, middle);
-        plan.lights.clear();
-        plan.lights.push(crate::plan::PlannedLight { maps: 0..1, theta_rad: space.theta_rad });
-        if !body.is_empty() {
-            scratch.plan_map(map, body, &space, &request);
+        self.plan.origin = camera.eye();
+        self.plan.lights.clear();
+        self.units.clear();
+        let view = &mut self.bodies.view;
+        view.set_frustum(camera);
+        if let Some(receivers) = bounds.receivers {
+            view.clip_aabb(receivers.relative_to(camera.eye()));
         }
-        Ok(&self.plan)
+        for (index, light) in lights.iter().enumerate() {
+            let light = light.checked()?;
+            let first = self.units.len();
+            for (side, lamp) in light.lamps() {
+                let part = Part { light: index, side, ..Part::default() };
+                self.draft_lamp(part, &Request { camera, lamp: &lamp, bounds, options });
+            }
+            let theta_rad = self.theta(&light, camera);
+            self.plan.lights.push(PlannedLight { maps: first..self.units.len(), theta_rad });
+        }
+        let Self { plan, drafts, units, sizes, scratch, .. } = self;
+        plan.maps.truncate(units.len());
+        resolutions(options, units, sizes)?;
+        for ((map, draft), &size) in plan.maps.iter_mut().zip(drafts).zip(&*sizes) {
+            scratch.finish(map, draft, size, camera, options)?;
+        }
+        Ok(plan)
+    }
+
+    /// Appends the maps of one lamp, all but their resolutions and what follows from them.
+    fn draft_lamp(&mut self, part: Part, request: &Request<'_>) {
+        let Request { camera, lamp, options, .. } = *request;
+        let pyramid = lamp.frustum(camera.eye());
+        let Bodies { view, lit, .. } = &mut self.bodies;
+        lit.copy_from(view);
+        pyramid.into_iter().flatten().for_each(|plane| lit.clip(plane));
+        let with_near = options.partition.faces == Faces::SidesAndNear;
+        let faces = partition::Faces::new(camera, lamp, with_near);
+        for &face in options.partition.face_list() {
+            self.cell.clear();
+            let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
+            let Bodies { lit, face: body, .. } = &mut self.bodies;
+            body.copy_from(lit);
+            self.cell.iter().for_each(|&plane| body.clip(plane));
+            if !has_part {
+                body.clear();
+            }
+            self.cell.extend(pyramid.into_iter().flatten());
+            let along = face.and_then(|f| faces.side(f)).map_or(Along::View, Along::Side);
+            self.draft_slices(Part { face, ..part }, &along, request);
+        }
+    }
+
+    /// Appends the maps of all slices of a face's part.
+    fn draft_slices(&mut self, part: Part, along: &Along, request: &Request<'_>) {
+        let Request { camera, options, .. } = *request;
+        let Bodies { face: body, slice, .. } = &mut self.bodies;
+        let (mut partition, mut warp) = (options.partition, options.warp);
+        if part.face == Some(Face::Near) {
+            // All its pixels are of one size.
+            partition.slices = 1;
+            if !matches!(warp, Warp::Unfocused | Warp::Adaptive(_)) {
+                warp = Warp::Uniform;
+            }
+        }
+        let [n, f] = if warp == Warp::Stable || body.is_empty() {
+            [camera.near(), camera.far()]
+        } else {
+            let depths = body.vertices().iter().map(|&v| along.depth_of(v, camera));
+            range(depths.map(|d| d.clamp(camera.near(), camera.far()))).into()
+        };
+        let ends = partition::split(&partition, [n, f], |from, to| {
+            slice.copy_from(body);
+            let begin = (from > n).then(|| along.plane_at(from, camera)).flatten();
+            let end = (to < f).then(|| along.plane_at(to, camera)).flatten();
+            begin.into_iter().chain(end.map(Plane::flipped)).for_each(|p| slice.clip(p));
+            self.trial.clear(camera);
+            let [s, t] = self.scratch.draft(&mut self.trial, slice, along, warp, request);
+            s * t
+        });
+        for i in 0..partition.slices as usize {
+            let index = self.units.len();
+            if self.plan.maps.len() == index {
+                self.plan.maps.push(ShadowMap::default());
+            }
+            if self.drafts.len() == index {
+                self.drafts.push(Draft::default());
+            }
+            let (map, draft) = (&mut self.plan.maps[index], &mut self.drafts[index]);
+            map.clear(camera);
+            map.part = Part { slice: i, ..part };
+            let split = [ends[i], ends[i + 1]];
+            map.split = split;
+            let is_last = i + 1 == partition.slices as usize;
+            let overlap = if is_last { 0.0 } else { partition.overlap };
+            let reach = split[1] + overlap * (split[1] - split[0]).max(0.0);
+            let before = |depth| along.plane_at(depth, camera).map(Plane::flipped);
+            // The first slice begins and the last one ends where what is served does.
+            let end = before(reach).filter(|_| !is_last);
+            let begin = along.plane_at(split[0], camera).filter(|_| i > 0);
+            draft.body.copy_from(body);
+            begin.into_iter().chain(end).for_each(|p| draft.body.clip(p));
+            map.fade_from = before(split[1]).filter(|_| overlap > 0.0);
+            map.cell.extend(end.into_iter().chain(begin));
+            map.cell.extend_from_slice(&self.cell);
+            map.cell.push(Plane { normal: -camera.forward(), offset: camera.far() });
+            draft.still = (warp == Warp::Stable).then(|| {
+                let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
+                Still::around(request.lamp, camera, range)
+            });
+            let unit = match &draft.still {
+                None => self.scratch.draft(map, &draft.body, along, warp, request),
+                Some(still) => still.unit_errors(),
+            };
+            self.units.push(unit);
+            self.scratch.caster_planes(map, &draft.body, request);
+        }
+    }
+
+    /// Angle between the view and a light's way at the middle of what is seen in it.
+    fn theta(&self, light: &Light, camera: &Camera) -> f64 {
+        let Bodies { view, lit, .. } = &self.bodies;
+        let seen = if matches!(light, Light::Point(_)) { view } else { lit };
+        theta(light, camera, seen.middle().unwrap_or(camera.forward() * camera.near()))
     }
 }
 
 /// Checked input.
 struct Request<'a> {
     camera: &'a Camera,
-    light: &'a Lamp,
+    lamp: &'a Lamp,
     bounds: &'a Bounds,
     options: &'a Options,
 }
 
 impl Request<'_> {
-    /// Sets `body` to what the camera sees of the receivers, in the light.
-    fn focus(&self, body: &mut ConvexBody) {
-        body.set_frustum(self.camera);
-        if let Some(receivers) = self.bounds.receivers {
-            body.clip_aabb(receivers.relative_to(self.camera.eye()));
-        }
-        for plane in self.light.frustum(self.camera.eye()).into_iter().flatten() {
-            body.clip(plane);
-        }
-    }
-
     /// Corners of all that `unfocused` covers, in local space.
     fn whole_scene(&self, space: &LightSpace) -> [DVec3; 8] {
         let eye = self.camera.eye();
         let scene = self.bounds.receivers.map(|r| self.bounds.casters.map_or(r, |c| r.union(c)));
-        match (self.light.corners(eye), scene) {
+        match (self.lamp.corners(eye), scene) {
             (Some(corners), _) => corners,
             (_, Some(scene)) => scene.relative_to(eye).corners(),
             (_, None) => bounding_cube(self.camera, space),
@@ -111,21 +234,27 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn plan_map(
+    /// Sets all of a map that does not depend on its resolution, and gives its largest errors in s and t
+    /// at one texel, pixels per texel; 0 without anything to serve.
+    fn draft(
         &mut self,
         map: &mut ShadowMap,
         body: &ConvexBody,
-        following_view: &LightSpace,
+        along: &Along,
+        warp: Warp,
         request: &Request<'_>,
-    ) {
-        let Request { camera, light, options, .. } = *request;
-        let is_unfocused = options.warp == Warp::Unfocused;
-        let space = &if is_unfocused { LightSpace::fixed(light, camera) } else { *following_view };
-        let Self { seen, covered, outline, worst } = self;
+    ) -> [f64; 2] {
+        let Request { camera, lamp, .. } = *request;
+        let Some(middle) = body.middle() else { return [0.0; 2] };
+        let space = &match along {
+            _ if warp == Warp::Unfocused => LightSpace::fixed(lamp, camera),
+            Along::View => LightSpace::following_view(lamp, camera, middle),
+            Along::Side(side) => LightSpace::following_face(lamp, camera, side, middle),
+        };
+        let Self { seen, covered, worst, .. } = self;
         let see = |p: DVec3| Seen::new(p, space, camera);
         seen.clear();
         seen.extend(body.vertices().iter().map(|&v| see(v)));
-        caster_planes(&mut map.caster_planes, body, seen, space, outline);
         if space.apex.is_some() {
             // Under a spot light errors need not be largest at corners. These are points enough to
             // choose a warp by; the errors reported do not depend on them.
@@ -137,7 +266,7 @@ impl Scratch {
         let seen = &*seen;
         // What the map has to cover is what is seen, but for `unfocused`. What is seen is covered
         // there too: its bounds were widened a little if they are flat.
-        let covered: &[Seen] = if is_unfocused {
+        let covered: &[Seen] = if warp == Warp::Unfocused {
             covered.clear();
             covered.extend(request.whole_scene(space).map(see));
             covered.extend_from_slice(seen);
@@ -147,62 +276,94 @@ impl Scratch {
         };
 
         let family = OnePoint::around(covered, space);
-        let unfitted = match options.warp {
+        let unfitted = match warp {
             Warp::Psm => psm(space, camera, body.vertices()),
             _ => None,
         };
-        let mut finish = |map: &mut ShadowMap, homography: DMat3| {
-            [map.shadow_from_local, map.local_from_shadow] = matrices(homography, covered, space);
-            map.apex = space.apex;
+        // Errors at one texel decide the resolution.
+        map.resolution = [1, 1];
+        map.apex = space.apex;
+        let set = |map: &mut ShadowMap, homography: DMat3| {
+            let depth = DepthRange::of(covered, homography, space);
+            [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, space);
             map.lambda = lambda(homography, seen);
-            map.split = range(seen.iter().map(|p| p.depth)).into();
-            let [near, far] = map.split;
-            map.cell = vec![
-                crate::Plane::through(camera.forward() * far, -camera.forward()),
-                crate::Plane::through(camera.forward() * near, camera.forward()),
-            ];
-            // Errors at one texel decide the resolution.
-            map.resolution = [1, 1];
-            let [unit_s, unit_t] = unit_errors(map, body, camera);
-            map.resolution = resolution(options, unit_s, unit_t);
-            map.error = worst_errors(map, body, camera, worst);
-            let height = f64::from(camera.image()[1]);
-            map.storage_factor =
-                map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
         };
         if let Some(unfitted) = unfitted {
-            finish(map, fit(unfitted, covered));
-            return;
+            set(map, fit(unfitted, covered));
+            return unit_errors(map, body, camera);
         }
-        let nu = family.strength(options.warp, covered, space, camera);
-        if options.warp == Warp::Log && nu > 1e-9 {
+        let nu = family.strength(warp, covered, space, camera);
+        if warp == Warp::Log && nu > 1e-9 {
             map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
         }
         // Under a spot light `adaptive` has chosen by samples. The promise not to be worse than
         // `uniform` is kept by looking.
-        let may_be_worse =
-            options.warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0;
-        let uniform = may_be_worse.then(|| {
-            finish(map, family.homography(0.0, covered));
-            map.storage_factor
-        });
-        finish(map, family.homography(nu, covered));
-        if uniform.is_some_and(|uniform| map.storage_factor >= uniform) {
-            finish(map, family.homography(0.0, covered));
+        if warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0 {
+            let mut storage = |nu: f64| {
+                set(map, family.homography(nu, covered));
+                let error = worst_errors(map, body, camera, worst);
+                error.max_s * error.max_t
+            };
+            if storage(0.0) <= storage(nu) {
+                set(map, family.homography(0.0, covered));
+            }
+        } else {
+            set(map, family.homography(nu, covered));
         }
+        unit_errors(map, body, camera)
+    }
+
+    fn caster_planes(&mut self, map: &mut ShadowMap, body: &ConvexBody, request: &Request<'_>) {
+        let space = LightSpace::fixed(request.lamp, request.camera);
+        caster_planes(&mut map.caster_planes, body, &space, &mut self.outline);
+    }
+
+    /// Gives a map its resolution and all that follows from it.
+    fn finish(
+        &mut self,
+        map: &mut ShadowMap,
+        draft: &Draft,
+        size: [u32; 2],
+        camera: &Camera,
+        options: &Options,
+    ) -> Result<(), Error> {
+        if draft.body.is_empty() {
+            map.resolution = [0, 0];
+            return Ok(());
+        }
+        let mut set = |map: &mut ShadowMap, size: [u32; 2]| {
+            map.resolution = size;
+            if let Some(still) = &draft.still {
+                still.place(map);
+            }
+            map.error = worst_errors(map, &draft.body, camera, &mut self.worst);
+        };
+        set(map, size);
+        if let Size::MaxError(wanted) = options.size {
+            // Sizes come from errors in s and t at the body's corners. The worst direction may be another.
+            while map.error.max > wanted {
+                let larger = enlarged(options, map.resolution, map.error.max / wanted)?;
+                set(map, larger);
+            }
+        }
+        let height = f64::from(camera.image()[1]);
+        map.storage_factor =
+            map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
+        Ok(())
     }
 }
 
-impl ShadowMap {
-    fn empty(camera: &Camera) -> Self {
+/// An empty map.
+impl Default for ShadowMap {
+    fn default() -> Self {
         Self {
-            origin: camera.eye(),
+            origin: DVec3::ZERO,
             shadow_from_local: DMat4::IDENTITY,
             local_from_shadow: DMat4::IDENTITY,
             rows: Rows::Even,
             resolution: [0, 0],
-            part: crate::plan::Part::default(),
-            split: [camera.near(), camera.near()],
+            part: Part::default(),
+            split: [0.0, 0.0],
             cell: Vec::new(),
             fade_from: None,
             lambda: None,
@@ -212,36 +373,34 @@ impl ShadowMap {
             apex: None,
         }
     }
+}
 
+impl ShadowMap {
     /// An empty map that keeps its buffers.
     fn clear(&mut self, camera: &Camera) {
-        let mut caster_planes = std::mem::take(&mut self.caster_planes);
+        let [mut cell, mut caster_planes] =
+            [&mut self.cell, &mut self.caster_planes].map(std::mem::take);
+        cell.clear();
         caster_planes.clear();
-        *self = Self { caster_planes, ..Self::empty(camera) };
+        *self = Self { origin: camera.eye(), cell, caster_planes, ..Self::default() };
     }
 }
 
 /// Largest m_s and m_t of a map at the body's vertices.
 fn unit_errors(map: &ShadowMap, body: &ConvexBody, camera: &Camera) -> [f64; 2] {
+    let pixel = camera.pixel_width_per_depth();
     body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
         [0.0f64; 2],
         |[s, t], (v, footprint)| {
-            let depth = camera.forward().dot(v);
-            [s.max(footprint.base() / depth), t.max(footprint.height() / depth)]
+            let width = camera.forward().dot(v) * pixel;
+            [s.max(footprint.base() / width), t.max(footprint.height() / width)]
         },
     )
 }
 
 /// The corners of a cube around the view frustum's bounding sphere, aligned with light space.
 fn bounding_cube(camera: &Camera, space: &LightSpace) -> [DVec3; 8] {
-    let [near, far] = [camera.near(), camera.far()].map(|d| camera.corners_at(d));
-    // On the axis of the frustum, where near and far corners are equally far, or at the far plane.
-    let axis = far.iter().sum::<DVec3>() / 4.0 / camera.far();
-    let (n2, f2) = (near[0].length_squared(), far[0].length_squared());
-    let along = (far[0] - near[0]).dot(axis) * 2.0;
-    let depth = ((f2 - n2) / along).min(camera.far());
-    let center = axis * depth;
-    let radius = near.iter().chain(&far).map(|c| c.distance(center)).fold(0.0, f64::max);
+    let (center, radius) = bounding_sphere(camera, [camera.near(), camera.far()]);
     let axes = [space.x, space.y, space.z].map(|row| row.truncate() * radius);
     std::array::from_fn(|i| {
         let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };

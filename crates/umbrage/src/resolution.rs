@@ -1,20 +1,145 @@
-use crate::options::{Options, Size};
+//! How many texels each map gets.
 
-/// Texels in s and t for a map whose largest errors at one texel and one pixel are `unit_s` and
-/// `unit_t`: res_s : res_t = M_s : M_t, so that both errors come out equal (Lloyd et al. 2006, Eqs. 13, 14).
-/// Never more texels than the budget; a side that the device cannot have is cut, and the other side gets
-/// what it leaves over.
-pub(crate) fn resolution(options: &Options, unit_s: f64, unit_t: f64) -> [u32; 2] {
-    let budget = match options.size {
-        Size::Exact(size) => return size,
-        Size::Budget(texels) => texels as f64,
-        Size::MaxError(_) => todo!(),
-    };
-    let ratio = (unit_s / unit_t).clamp(1e-9, 1e9);
-    let max = f64::from(options.max_side);
-    let s = (budget * ratio).sqrt().clamp(1.0, max);
-    // Rounding s first and giving t what is left keeps within the budget and wastes the least.
-    let t = (budget / s.round()).floor().clamp(1.0, max);
-    let s = (budget / t).floor().clamp(1.0, max).min(if t == max { max } else { s.round() });
-    [s as u32, t as u32]
+use crate::error::{Error, check};
+use crate::options::{Options, Size, Warp};
+
+/// Ratios of a map's sides beyond this are cut.
+const MAX_RATIO: f64 = 1e9;
+
+/// Texels in s and t for maps whose largest errors at one texel are `units` (pixels per texel), each
+/// pushed to `sizes` in turn. Maps with units of zero get none.
+///
+/// With a budget all maps get the same largest error in s and in t: S texels over maps that need
+/// uᵢ = M_s M_t each for an error of one are divided as S uᵢ/Σu, and within a map as
+/// res_s : res_t = M_s : M_t (Lloyd et al. 2006, Eqs. 13, 14). A side that the device cannot have is cut,
+/// and what it leaves over goes to the other side and to the other maps.
+///
+/// # Errors
+/// A budget of less than the smallest possible size for each map; an error that needs sides longer than
+/// the device has.
+pub(crate) fn resolutions(
+    options: &Options,
+    units: &[[f64; 2]],
+    sizes: &mut Vec<[u32; 2]>,
+) -> Result<(), Error> {
+    sizes.clear();
+    let limits = Limits::new(options);
+    match options.size {
+        Size::Exact(size) => {
+            sizes.extend(units.iter().map(|u| if is_empty(u) { [0; 2] } else { size }))
+        }
+        Size::Budget(texels) => {
+            let least = (limits.least as u64).pow(2) * units.len() as u64;
+            check(texels >= least, "options.size", || {
+                format!(
+                    "a budget of {texels} texels is too small for {} maps, which need at least {least}",
+                    units.len()
+                )
+            })?;
+            let error = common_error(&limits, units, texels as f64);
+            sizes.extend(units.iter().map(|&unit| {
+                if is_empty(&unit) {
+                    return [0; 2];
+                }
+                let [s, t] = limits.sides(unit, error);
+                limits.within(s * t, unit)
+            }));
+        }
+        Size::MaxError(error) => {
+            for unit in units {
+                sizes.push(if is_empty(unit) { [0; 2] } else { limits.at_least(*unit, error)? });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn is_empty(unit: &[f64; 2]) -> bool {
+    unit.contains(&0.0)
+}
+
+/// `size` scaled up by `factor` each way, within what the device allows.
+pub(crate) fn enlarged(options: &Options, size: [u32; 2], factor: f64) -> Result<[u32; 2], Error> {
+    Limits::new(options).at_least(size.map(|n| f64::from(n) * factor), 1.0)
+}
+
+/// What sides a map may have, texels.
+struct Limits {
+    /// Sides are multiples of this.
+    align: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Limits {
+    fn new(options: &Options) -> Self {
+        let align = f64::from(options.align);
+        let least: f64 = if options.warp == Warp::Stable { 2.0 } else { 1.0 };
+        Self {
+            align,
+            least: (least / align).ceil() * align,
+            most: (f64::from(options.max_side) / align).floor() * align,
+        }
+    }
+
+    /// Sides, not yet whole, at which a map's errors are `error`; cut to the limits.
+    fn sides(&self, [s, t]: [f64; 2], error: f64) -> [f64; 2] {
+        [s, t].map(|unit| (unit / error).clamp(self.least, self.most))
+    }
+
+    fn aligned(&self, side: f64) -> f64 {
+        ((side / self.align).floor() * self.align).clamp(self.least, self.most)
+    }
+
+    /// The best whole sides for no more than `texels`, which suffice for the least sides.
+    fn within(&self, texels: f64, [unit_s, unit_t]: [f64; 2]) -> [u32; 2] {
+        let ratio = (unit_s / unit_t).clamp(1.0 / MAX_RATIO, MAX_RATIO);
+        let wanted = (texels * ratio).sqrt().min(texels / self.least);
+        // Rounding s first and giving t what is left keeps within the budget and wastes the least.
+        let nearest = self.aligned(wanted + self.align / 2.0);
+        let s = if nearest * self.least <= texels { nearest } else { self.aligned(wanted) };
+        let t = self.aligned(texels / s);
+        let s =
+            if t == self.most { self.aligned(texels / t) } else { s.min(self.aligned(texels / t)) };
+        [s as u32, t as u32]
+    }
+
+    /// The least whole sides with errors of no more than `error`.
+    fn at_least(&self, unit: [f64; 2], error: f64) -> Result<[u32; 2], Error> {
+        let sides = unit.map(|u| ((u / error / self.align).ceil() * self.align).max(self.least));
+        check(sides.iter().all(|&n| n <= self.most), "options.size", || {
+            format!(
+                "so small an error needs a map of {}x{} texels, and sides end at {}",
+                sides[0], sides[1], self.most
+            )
+        })?;
+        Ok(sides.map(|n| n as u32))
+    }
+}
+
+/// The error that all maps have when `texels` are spread over them.
+fn common_error(limits: &Limits, units: &[[f64; 2]], texels: f64) -> f64 {
+    let used = || units.iter().filter(|u| !is_empty(u));
+    let total =
+        |error: f64| used().map(|&u| limits.sides(u, error)).map(|[s, t]| s * t).sum::<f64>();
+    let unlimited = (used().map(|[s, t]| s * t).sum::<f64>() / texels).sqrt();
+    let fits = |error: f64| total(error) <= texels;
+    let cuts_nothing = used()
+        .all(|u| u.iter().all(|side| (limits.least..=limits.most).contains(&(side / unlimited))));
+    if cuts_nothing || used().next().is_none() {
+        return unlimited;
+    }
+    // Texels fall as the error grows. Bracket, then halve.
+    let (mut lo, mut hi) = (unlimited, unlimited);
+    while !fits(hi) && hi < unlimited * 1e30 {
+        hi *= 4.0;
+    }
+    while fits(lo) && lo > unlimited * 1e-30 {
+        lo /= 4.0;
+    }
+    for _ in 0..50 {
+        let middle = (lo * hi).sqrt();
+        if fits(middle) { hi = middle } else { lo = middle }
+    }
+    hi
 }

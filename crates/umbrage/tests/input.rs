@@ -173,6 +173,7 @@ fn odd_input_gives_sound_plans() {
                         match size {
                             Size::Budget(budget) => assert!(map.texels() <= budget, "{what}"),
                             Size::Exact(size) => assert!(map.is_empty() || map.resolution == size),
+                            Size::MaxError(px) => assert!(map.error.max <= px),
                         }
                         if map.is_empty() {
                             assert!(

@@ -52,6 +52,7 @@ proptest! {
             let reach = match config.light {
                 Light::Directional { .. } => 10.0 * config.camera.far(),
                 Light::Spot(spot) => 0.9 * p.distance(spot.position),
+                Light::Point(point) => 0.9 * p.distance(point.position),
             };
             let caster = p + config.light.direction_to_light(p) * reach;
             let Some(casts) = map.project(caster) else {

@@ -1,24 +1,11 @@
 use super::*;
-use crate::plan::{MapError, Rows};
-use glam::DMat4;
+use crate::plan::Rows;
 use proptest::prelude::*;
 use std::cell::RefCell;
 
 /// A map whose shadow space is world space.
 fn map(resolution: [u32; 2], rows: Rows) -> ShadowMap {
-    ShadowMap {
-        origin: glam::DVec3::ZERO,
-        shadow_from_local: DMat4::IDENTITY,
-        local_from_shadow: DMat4::IDENTITY,
-        rows,
-        resolution,
-        split: [0.0, 1.0],
-        lambda: None,
-        error: MapError::default(),
-        storage_factor: 1.0,
-        caster_planes: Vec::new(),
-        apex: None,
-    }
+    ShadowMap { rows, resolution, ..ShadowMap::default() }
 }
 
 fn flat(s: f64, t: f64, depth: f64) -> Receiver {
@@ -132,7 +119,7 @@ proptest! {
 fn outside_the_map_or_its_depths_there_is_light() {
     let all_dark = |_, _| 0.0;
     for filter in filters() {
-        for (s, t) in [(-1e-9, 0.5), (1.0 + 1e-9, 0.5), (0.5, -3.0), (0.5, 1.1)] {
+        for (s, t) in [(-1e-5, 0.5), (1.0 + 1e-5, 0.5), (0.5, -3.0), (0.5, 1.1)] {
             assert_eq!(
                 visibility(&map([8, 8], Rows::Even), filter, &flat(s, t, 0.5), all_dark),
                 1.0

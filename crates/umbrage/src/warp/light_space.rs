@@ -1,6 +1,7 @@
 use crate::camera::Camera;
-use crate::light::Lamp;
+use crate::light::{Lamp, Light};
 use crate::math::perpendicular_pair;
+use crate::partition::Side;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// Light space (Wimmer et al. 2004, §3.4) over local space: for spot lights after the light's own
@@ -15,8 +16,9 @@ pub(crate) struct LightSpace {
     pub w: DVec4,
     /// Local position of a spot light.
     pub apex: Option<DVec3>,
-    /// Angle between view direction and the way of the light, radians, 0 ..= π.
-    pub theta_rad: f64,
+    /// Sine of the angle by which the view falls off the way of the light, as rules for λ understand it; for
+    /// faces of the frustum 1.
+    pub sin_theta: f64,
     /// Light-space z per metre along the view, at the middle of what is seen. For directional lights
     /// sin θ.
     pub z_per_view_metre: f64,
@@ -25,36 +27,49 @@ pub(crate) struct LightSpace {
 impl LightSpace {
     /// Light space for a view, with z following the view direction. `middle` is a local point
     /// amid what is seen.
-    pub(crate) fn following_view(light: &Lamp, camera: &Camera, middle: DVec3) -> Self {
-        let view = camera.forward();
-        let (direction, apex) = light.direction_and_apex(camera.eye());
+    pub(crate) fn following_view(lamp: &Lamp, camera: &Camera, middle: DVec3) -> Self {
+        let (direction, apex) = lamp.direction_and_apex(camera.eye());
+        let beam = apex.map_or(direction, |apex| (middle - apex).normalize());
+        let sin_theta = beam.cross(camera.forward()).length();
+        Self { sin_theta, ..Self::following(lamp, camera, camera.forward(), middle) }
+    }
+
+    /// Light space for a side face of the view frustum, with z following the middle of the face. On the face
+    /// pixels grow along z as they do along the view under an overhead light, whatever the light's
+    /// direction.
+    pub(crate) fn following_face(lamp: &Lamp, camera: &Camera, side: &Side, middle: DVec3) -> Self {
+        Self::following(lamp, camera, side.middle(), middle)
+    }
+
+    /// `along` is of unit depth.
+    fn following(lamp: &Lamp, camera: &Camera, along: DVec3, middle: DVec3) -> Self {
+        let (direction, apex) = lamp.direction_and_apex(camera.eye());
         let (beam, slope) = match apex {
-            None => (direction, view),
+            None => (direction, along),
             Some(apex) => {
                 let r = middle - apex;
                 let depth = direction.dot(r);
-                // Derivative of the light's image of `middle` as it moves along the view.
-                (r.normalize(), (view - r * (direction.dot(view) / depth)) / depth)
+                // Derivative of the light's image of `middle` as it moves along.
+                (r.normalize(), (along - r * (direction.dot(along) / depth)) / depth)
             }
         };
         let z = slope - direction * direction.dot(slope);
         let z_per_view_metre = z.length();
-        let theta_rad = beam.cross(view).length().atan2(beam.dot(view));
         // Looking exactly along the light any z will do. Up in the picture is one that keeps
         // still while the viewer moves.
         let z =
-            z.try_normalize().filter(|_| beam.cross(view).length() > 1e-12).unwrap_or_else(|| {
+            z.try_normalize().filter(|_| beam.cross(along).length() > 1e-12).unwrap_or_else(|| {
                 let up = camera.up();
                 (up - direction * direction.dot(up))
                     .try_normalize()
                     .unwrap_or_else(|| direction.any_orthonormal_vector())
             });
-        Self::new(direction, apex, z, theta_rad, z_per_view_metre)
+        Self::new(direction, apex, z, 1.0, z_per_view_metre)
     }
 
     /// Light space with an orientation that depends on the light alone.
-    pub(crate) fn fixed(light: &Lamp, camera: &Camera) -> Self {
-        let (direction, apex) = light.direction_and_apex(camera.eye());
+    pub(crate) fn fixed(lamp: &Lamp, camera: &Camera) -> Self {
+        let (direction, apex) = lamp.direction_and_apex(camera.eye());
         let [_, z] = perpendicular_pair(direction);
         Self::new(direction, apex, z, 0.0, 0.0)
     }
@@ -63,7 +78,7 @@ impl LightSpace {
         direction: DVec3,
         apex: Option<DVec3>,
         z: DVec3,
-        theta_rad: f64,
+        sin_theta: f64,
         z_per_view_metre: f64,
     ) -> Self {
         // z came out of a difference that cancels as the view turns into the light.
@@ -75,7 +90,7 @@ impl LightSpace {
             None => (row(-direction), DVec4::W),
             Some(_) => (DVec4::W, row(direction)),
         };
-        Self { x: row(x), y, z: row(z), w, apex, theta_rad, z_per_view_metre }
+        Self { x: row(x), y, z: row(z), w, apex, sin_theta, z_per_view_metre }
     }
 
     /// (x, z) and y of a local point; the divisor must be positive there.
@@ -100,4 +115,10 @@ impl LightSpace {
     pub(crate) fn light_from_local(&self) -> DMat4 {
         DMat4::from_cols(self.x, self.y, self.z, self.w).transpose()
     }
+}
+
+/// Angle θ between view direction and the way of the light at a local point, radians, 0 ..= π.
+pub(crate) fn theta(light: &Light, camera: &Camera, p: DVec3) -> f64 {
+    let beam = -light.direction_to_light(camera.eye() + p);
+    beam.cross(camera.forward()).length().atan2(beam.dot(camera.forward()))
 }

@@ -5,7 +5,7 @@ mod light_space;
 mod psm;
 
 pub(crate) use adaptive::least_error;
-pub(crate) use light_space::LightSpace;
+pub(crate) use light_space::{LightSpace, theta};
 pub(crate) use psm::psm;
 
 use crate::camera::Camera;
@@ -118,7 +118,7 @@ impl OnePoint {
                 // not for its opposite. The cost has one valley, so that less warp than the best is
                 // still better than none.
                 let phi = camera.tan_half_fov_y().atan();
-                let fade = (4.0 * space.theta_rad.sin() / phi.sin()).min(1.0);
+                let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
                 least_error(self, seen, objective) * fade
             }
             Warp::Lispsm => self.along_view(space, |view| {
@@ -146,7 +146,7 @@ impl OnePoint {
     /// A strength that follows from the view; none where the view runs along the light and z has no
     /// direction to follow.
     fn along_view(&self, space: &LightSpace, strength: impl FnOnce(AlongView) -> f64) -> f64 {
-        let sin_theta = space.theta_rad.sin();
+        let sin_theta = space.sin_theta;
         if sin_theta <= 1e-12 || space.z_per_view_metre <= 0.0 {
             return 0.0;
         }

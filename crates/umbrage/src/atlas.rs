@@ -1,0 +1,252 @@
+use crate::plan::{Plan, ShadowMap};
+use glam::DVec2;
+use guillotiere::{AllocatorOptions, DEFAULT_OPTIONS, SimpleAtlasAllocator, size2};
+
+/// Where in a texture, or in an array of them, the maps of a [`Plan`] lie.
+///
+/// Around each map lies a gutter, no texel of which is shared. Render it with the map (texels just
+/// outside [0, 1]² have depths like any other), so that filters at a map's border see no other map.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Atlas {
+    /// Width and height of the texture, texels; both 0 where all maps are empty.
+    pub size: [u32; 2],
+    /// Layers of the texture, all of one size.
+    pub layers: u32,
+    /// Width of the gutter around each map, texels.
+    pub gutter_texels: u32,
+    /// Where each map lies, in the order of [`Plan::maps`]; `None` for those that are empty.
+    pub places: Vec<Option<Place>>,
+}
+
+/// A rectangle of texels in an [`Atlas`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Layer of the texture.
+    pub layer: u32,
+    /// Texel of that layer at which the map begins, inside its gutter: (s, t) = (0, 0).
+    pub origin: [u32; 2],
+    /// The map's resolution, texels.
+    pub size: [u32; 2],
+}
+
+/// Takes a map's (s, t), after [`Rows`](crate::Rows), to where it lies: scale · (s, t) + offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleOffset {
+    /// Factors of s and t.
+    pub scale: DVec2,
+    /// Where (0, 0) lies.
+    pub offset: DVec2,
+}
+
+/// The maps do not fit into one texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no room for {maps} shadow maps of {texels} texels, gutters included, in a texture of {max_side}x{max_side}"
+)]
+pub struct AtlasTooLarge {
+    /// Maps that are not empty.
+    pub maps: usize,
+    /// Their texels, gutters included.
+    pub texels: u64,
+    /// The longest side that was allowed, texels.
+    pub max_side: u32,
+}
+
+impl Atlas {
+    /// All maps side by side in one texture, as small and as square as the search finds. The same plan
+    /// gives the same atlas, but a plan that differs little may give one that differs much.
+    ///
+    /// `gutter_texels` is how far the filter [reaches](crate::visibility::Filter::reach_texels) beyond
+    /// a map, `max_side` the longest side that the device allows a texture. Allocates.
+    ///
+    /// # Errors
+    /// Where no arrangement is found. Maps of every size together need some tenth more than their
+    /// texels.
+    pub fn packed(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
+        let boxes = Boxes::new(plan, gutter_texels, max_side)?;
+        let packing = boxes.pack().ok_or(boxes.too_large)?;
+        let mut places = vec![None; plan.maps.len()];
+        for (&(map, _), corner) in boxes.list.iter().zip(packing.corners) {
+            places[map] = Some(Place {
+                layer: 0,
+                origin: corner.map(|c| c + gutter_texels),
+                size: plan.maps[map].resolution,
+            });
+        }
+        Ok(Self { size: packing.size, layers: 1, gutter_texels, places })
+    }
+
+    /// Each map in a layer of its own, in the order of [`Plan::maps`], all as wide and as high as the
+    /// largest. Empty maps keep their layers, so that no map moves when others become empty.
+    ///
+    /// Parameters and errors are those of [`packed`](Self::packed).
+    pub fn layered(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
+        let boxes = Boxes::new(plan, gutter_texels, max_side)?;
+        let places = plan.maps.iter().zip(0..).map(|(map, layer)| {
+            (!map.is_empty()).then_some(Place {
+                layer,
+                origin: [gutter_texels; 2],
+                size: map.resolution,
+            })
+        });
+        Ok(Self {
+            size: boxes.largest(),
+            layers: plan.maps.len() as u32,
+            gutter_texels,
+            places: places.collect(),
+        })
+    }
+
+    /// From a map's (s, t) to texels of its layer. `None` for empty maps and those that the plan does
+    /// not have.
+    pub fn texels_from_shadow(&self, map: usize) -> Option<ScaleOffset> {
+        let Place { origin, size, .. } = (*self.places.get(map)?)?;
+        let [scale, offset] = [size, origin].map(|[x, y]: [u32; 2]| DVec2::new(x.into(), y.into()));
+        Some(ScaleOffset { scale, offset })
+    }
+
+    /// From a map's (s, t) to texture coordinates in [0, 1]² of its layer; otherwise as
+    /// [`texels_from_shadow`](Self::texels_from_shadow).
+    pub fn atlas_from_shadow(&self, map: usize) -> Option<ScaleOffset> {
+        let ScaleOffset { scale, offset } = self.texels_from_shadow(map)?;
+        let size = DVec2::new(self.size[0].into(), self.size[1].into());
+        Some(ScaleOffset { scale: scale / size, offset: offset / size })
+    }
+}
+
+impl ScaleOffset {
+    /// Where `st` lies.
+    pub fn apply(self, st: DVec2) -> DVec2 {
+        self.scale * st + self.offset
+    }
+}
+
+/// Rectangles to be packed.
+struct Boxes {
+    /// Index of the map, and its size with gutters.
+    list: Vec<(usize, [u32; 2])>,
+    max_side: u32,
+    /// What to say where there is no room.
+    too_large: AtlasTooLarge,
+}
+
+/// Rectangles side by side.
+struct Packing {
+    size: [u32; 2],
+    /// Of each rectangle, the one with the smallest coordinates.
+    corners: Vec<[u32; 2]>,
+}
+
+impl Packing {
+    /// What to make small: the area, then the longer side.
+    fn cost(&self) -> (u64, u32) {
+        (area(self.size), self.size[0].max(self.size[1]))
+    }
+}
+
+impl Boxes {
+    /// The maps with their gutters, if each of them fits.
+    fn new(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
+        let with_gutters = |map: &ShadowMap| {
+            map.resolution.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)))
+        };
+        let full = || plan.maps.iter().enumerate().filter(|(_, m)| !m.is_empty());
+        let texels = full().map(|(_, m)| with_gutters(m).into_iter().fold(1, u64::saturating_mul));
+        let too_large = AtlasTooLarge {
+            maps: full().count(),
+            texels: texels.fold(0, u64::saturating_add),
+            max_side,
+        };
+        let fitting = |(i, map)| {
+            let [w, h] =
+                with_gutters(map).map(|n| u32::try_from(n).ok().filter(|&n| n <= max_side));
+            Some((i, [w?, h?]))
+        };
+        let list = full().map(fitting).collect::<Option<_>>().ok_or(too_large)?;
+        Ok(Self { list, max_side, too_large })
+    }
+
+    /// The size that holds any one of them.
+    fn largest(&self) -> [u32; 2] {
+        self.list.iter().fold([0, 0], |[w, h], &(_, size)| [w.max(size[0]), h.max(size[1])])
+    }
+
+    /// The best packing over several orders and widths, and for each of these the lowest height.
+    fn pack(&self) -> Option<Packing> {
+        let texels = self.too_large.texels;
+        let [widest, highest] = self.largest();
+        if texels == 0 {
+            return Some(Packing { size: [0, 0], corners: Vec::new() });
+        }
+        // Beyond 2 : 1 either way nothing is gained but length.
+        let side = (texels as f64).sqrt();
+        let widths = (0..WIDTHS).map(|i| {
+            let ratio = (f64::from(i) / f64::from(WIDTHS - 1) * 2.0 - 1.0).exp2();
+            ((side * ratio).ceil() as u32).clamp(widest, self.max_side)
+        });
+        let mut widths: Vec<u32> = widths.collect();
+        widths.dedup();
+        let mut best: Option<Packing> = None;
+        for order in ORDERS {
+            let mut sorted: Vec<usize> = (0..self.list.len()).collect();
+            sorted.sort_by_key(|&i| std::cmp::Reverse(order(self.list[i].1)));
+            for &width in &widths {
+                let mut low = highest.max(texels.div_ceil(width.into()).try_into().ok()?);
+                // Higher than this is no better than the best so far.
+                let bound = best.as_ref().map_or(u64::MAX, |b| b.cost().0 / u64::from(width));
+                let mut high = self.max_side.min(bound.try_into().unwrap_or(u32::MAX));
+                while low <= high {
+                    let height = low.midpoint(high.min(low.saturating_mul(2)));
+                    match self.pack_into([width, height], &sorted) {
+                        Some(packing) => {
+                            high = packing.size[1] - 1;
+                            if best.as_ref().is_none_or(|b| packing.cost() < b.cost()) {
+                                best = Some(packing);
+                            }
+                        }
+                        None => low = (height + 1).max(high.min(height + height / FINENESS)),
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Packs into one rectangle, in this order.
+    fn pack_into(&self, size: [u32; 2], order: &[usize]) -> Option<Packing> {
+        let int = |n: u32| i32::try_from(n).unwrap_or(i32::MAX);
+        let mut allocator =
+            SimpleAtlasAllocator::with_options(size2(int(size[0]), int(size[1])), &BEST_FIT);
+        let mut packing = Packing { size: [0, 0], corners: vec![[0, 0]; order.len()] };
+        for &i in order {
+            let [w, h] = self.list[i].1;
+            let place = allocator.allocate(size2(int(w), int(h)))?;
+            packing.corners[i] = place.min.to_array().map(i32::cast_unsigned);
+            let end = place.max.to_array().map(i32::cast_unsigned);
+            packing.size = [packing.size[0].max(end[0]), packing.size[1].max(end[1])];
+        }
+        Some(packing)
+    }
+}
+
+/// Widths tried in each order.
+const WIDTHS: u32 = 24;
+/// Heights closer than one part in this many are not told apart.
+const FINENESS: u32 = 64;
+
+/// What comes first, by decreasing size: none of these is best for all plans.
+const ORDERS: [fn([u32; 2]) -> [u32; 2]; 3] =
+    [|[w, h]| [h, w], |[w, h]| [w, h], |[w, h]| [w.max(h), w.min(h)]];
+
+/// One list of free rectangles, of which the one that fits closest is taken. With the crate's own
+/// thresholds large rectangles go where most room is left, which keeps a long-lived atlas from
+/// crumbling; filled once, it wastes three times as much.
+const BEST_FIT: AllocatorOptions = AllocatorOptions {
+    small_size_threshold: i32::MAX,
+    large_size_threshold: i32::MAX,
+    ..DEFAULT_OPTIONS
+};
+
+fn area([w, h]: [u32; 2]) -> u64 {
+    u64::from(w) * u64::from(h)
+}

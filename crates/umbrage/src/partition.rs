@@ -1,0 +1,269 @@
+//! Which part of what is seen goes to which map (Lloyd et al. 2006, §5).
+
+use crate::bounds::Plane;
+use crate::camera::Camera;
+use crate::light::Lamp;
+use crate::options::{Partition, Splits};
+use crate::plan::Face;
+use glam::{DVec3, DVec4};
+
+/// The ends of slices; those beyond the last one are not used.
+pub(crate) type Ends = [f64; Partition::MAX_SLICES + 1];
+
+/// How the view frustum's faces lie to a light, in local space. The faces that together cover what the
+/// light sees of the frustum, each once, are its front faces if the light comes from behind the viewer,
+/// else its back faces (W&P §5.1); the near face is among them either way.
+///
+/// A face's part of space is a wedge around the line from the eye to the light, between the two planes
+/// through that line and the face's side edges. Wedges end nowhere, so that rounding at the frustum's
+/// outline loses nobody.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Faces {
+    /// From the eye through the frustum's corners, unit depth: lower left, lower right, upper right, upper
+    /// left. Face i lies between corners i and i + 1.
+    rays: [DVec3; 4],
+    light: DVec4,
+    is_used: [bool; 4],
+    /// Distance of the near face, if it has a map of its own.
+    near: Option<f64>,
+}
+
+/// Faces that see the light under a smaller slope than this are edge-on: their part is empty.
+const EDGE_ON: f64 = 1e-12;
+
+impl Faces {
+    pub(crate) fn new(camera: &Camera, lamp: &Lamp, with_near: bool) -> Self {
+        let light = homogeneous(lamp, camera);
+        let rays = camera.corners_at(1.0);
+        let towards = light.truncate();
+        let along_view = camera.forward().dot(towards);
+        let is_behind = along_view <= 0.0;
+        let is_used = std::array::from_fn(|i| {
+            let inwards = rays[(i + 1) % 4].cross(rays[i]).normalize();
+            let inside = -inwards.dot(towards) / towards.length();
+            if is_behind { inside < -EDGE_ON } else { inside > EDGE_ON }
+        });
+        // The near face is one of those used unless it is edge-on or a lamp stands before it.
+        let over_near = along_view - camera.near() * light.w;
+        let sees_near =
+            if is_behind { over_near } else { -over_near } < -EDGE_ON * towards.length();
+        let near = (with_near && sees_near).then(|| camera.near());
+        Self { rays, light, is_used, near }
+    }
+
+    /// Appends the planes around a face's part of space; `false` if it has none.
+    pub(crate) fn cell(&self, face: Face, planes: &mut Vec<Plane>) -> bool {
+        let Some(side) = self.side(face) else {
+            // Before the near edges of all the faces used.
+            let ends =
+                self.used().filter_map(|i| self.near.and_then(|n| self.sides(i).plane_at(n)));
+            planes.extend(ends.map(Plane::flipped));
+            return self.near.is_some();
+        };
+        let i = face as usize;
+        if !self.is_used[i] {
+            return false;
+        }
+        let middle = side.middle();
+        for (neighbour, ray) in [((i + 3) % 4, side.a), ((i + 1) % 4, side.b)] {
+            // Where the neighbour has no part, this one reaches to the outline and beyond.
+            let normal = ray.cross(self.light.truncate()).try_normalize();
+            if let Some(normal) = normal.filter(|_| self.is_used[neighbour]) {
+                let sign = normal.dot(middle).signum();
+                planes.push(Plane { normal: normal * sign, offset: 0.0 });
+            }
+        }
+        planes.extend(self.near.and_then(|n| side.plane_at(n)));
+        true
+    }
+
+    /// A side face; `None` for the near face.
+    pub(crate) fn side(&self, face: Face) -> Option<Side> {
+        (face != Face::Near).then(|| self.sides(face as usize))
+    }
+
+    fn sides(&self, i: usize) -> Side {
+        Side { a: self.rays[i], b: self.rays[(i + 1) % 4], light: self.light }
+    }
+
+    fn used(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..4).filter(|&i| self.is_used[i])
+    }
+}
+
+/// The light as a homogeneous local point.
+fn homogeneous(lamp: &Lamp, camera: &Camera) -> DVec4 {
+    match lamp.direction_and_apex(camera.eye()) {
+        (direction, None) => -direction.extend(0.0),
+        (_, Some(apex)) => apex.extend(1.0),
+    }
+}
+
+/// A side face of the view frustum and a light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Side {
+    /// From the eye along the face's side edges, unit depth.
+    a: DVec3,
+    b: DVec3,
+    light: DVec4,
+}
+
+impl Side {
+    /// From the eye along the middle of the face, unit depth: projected perpendicular to the light this
+    /// is the bisector of the face's side edges, whose lengths are alike.
+    pub(crate) fn middle(&self) -> DVec3 {
+        self.a.midpoint(self.b)
+    }
+
+    /// What lies farther than `depth` on the face: the half-space through the line there and the light.
+    /// `None` if the light stands on that line.
+    fn plane_at(&self, depth: f64) -> Option<Plane> {
+        let on_line = self.a * depth;
+        let to_light = self.light.truncate() - on_line * self.light.w;
+        let normal = (self.b - self.a).cross(to_light).try_normalize()?;
+        let sign = normal.dot(self.middle()).signum();
+        Some(Plane::through(on_line, normal * sign))
+    }
+
+    /// View depth at which the beam through `p` meets the face; infinite where it does not.
+    fn depth_of(&self, p: DVec3, camera: &Camera) -> f64 {
+        let normal = self.a.cross(self.b);
+        let towards = self.light.truncate() - p * self.light.w;
+        let meets = p - towards * (normal.dot(p) / normal.dot(towards));
+        let depth = camera.forward().dot(meets);
+        if depth.is_finite() && depth > 0.0 { depth } else { f64::INFINITY }
+    }
+}
+
+/// What slices are counted along.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Along {
+    /// The view.
+    View,
+    /// A side face of the view frustum. So that no map reaches behind another's, a slice is what lies in
+    /// the beams through its part of the face, not what lies between two view distances.
+    Side(Side),
+}
+
+impl Along {
+    /// What lies farther than `depth`.
+    pub(crate) fn plane_at(&self, depth: f64, camera: &Camera) -> Option<Plane> {
+        match self {
+            Self::View => Some(Plane { normal: camera.forward(), offset: -depth }),
+            Self::Side(side) => side.plane_at(depth),
+        }
+    }
+
+    /// Where a local point counts, metres along the view.
+    pub(crate) fn depth_of(&self, p: DVec3, camera: &Camera) -> f64 {
+        match self {
+            Self::View => camera.forward().dot(p),
+            Self::Side(side) => side.depth_of(p, camera),
+        }
+    }
+}
+
+/// Where slices between `n` and `f` begin and end. `storage` tells how many texels a slice needs, by
+/// any measure that grows with the slice.
+pub(crate) fn split(
+    partition: &Partition,
+    [n, f]: [f64; 2],
+    storage: impl FnMut(f64, f64) -> f64,
+) -> Ends {
+    let k = partition.slices as usize;
+    let self_similar = |i: usize| n * (f / n).powf(i as f64 / k as f64);
+    let even = |i: usize| n + (f - n) * (i as f64 / k as f64);
+    let mut ends = [f; Partition::MAX_SLICES + 1];
+    ends[0] = n;
+    if partition.splits == Splits::Fitted {
+        equalize(&mut ends[..=k], storage);
+        return ends;
+    }
+    for (i, end) in ends.iter_mut().enumerate().take(k).skip(1) {
+        *end = match partition.splits {
+            Splits::SelfSimilar | Splits::Fitted => self_similar(i),
+            Splits::Practical(blend) => even(i) + (self_similar(i) - even(i)) * blend,
+            Splits::At(distances) => distances[i - 1],
+        };
+    }
+    ends
+}
+
+/// How alike the storage of fitted slices is, as a share.
+const FITTED: f64 = 1e-3;
+
+/// Moves all but the first and last end so that all slices need the same storage.
+///
+/// Given what each may need, slices are laid one after the other from the near end; what they may need
+/// is right when the last one ends at the far end. Storage grows with a slice at both its ends, so both
+/// searches have one answer.
+fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
+    let k = ends.len() - 1;
+    let [n, f] = [ends[0], ends[k]];
+    if k == 1 || f <= n {
+        return;
+    }
+    let most = storage(n, f).ln();
+    // Logarithm of what a slice needs over what it may. Far from 0 its size says nothing more: an empty
+    // slice needs nothing.
+    let mut over = |a: f64, b: f64, allowed: f64| (storage(a, b).ln() - allowed).clamp(-2.0, 2.0);
+    let mut excess_of_last = |allowed: f64| {
+        for i in 1..k {
+            let begin = ends[i - 1];
+            let whole = over(begin, f, allowed);
+            let range = [begin.ln(), f.ln()];
+            ends[i] = if whole <= 0.0 || begin >= f {
+                f
+            } else {
+                root(range, [-2.0, whole], FITTED / 4.0, |end| over(begin, end.exp(), allowed))
+                    .exp()
+            };
+        }
+        if ends[k - 1] >= f { -2.0 } else { over(ends[k - 1], f, allowed) }
+    };
+    // All may be in the first slice; and at most how much less may be enough is not known.
+    let mut least = most - 1.0;
+    let mut at_least = excess_of_last(least);
+    for step in [2.0, 4.0, 8.0, 16.0, 32.0] {
+        if at_least <= 0.0 {
+            least -= step;
+            at_least = excess_of_last(least);
+        }
+    }
+    if at_least > 0.0 {
+        root([least, most], [-at_least, 2.0], FITTED, |allowed| -excess_of_last(allowed));
+    }
+}
+
+/// A root of a rising function between `lo` and `hi`, from its values there, to within `tolerance` in
+/// its value: false position with the Illinois correction, and halving every third step, because where a
+/// slice begins storage can be a cliff. The function's last call is at the root given.
+fn root(
+    [mut lo, mut hi]: [f64; 2],
+    [mut at_lo, mut at_hi]: [f64; 2],
+    tolerance: f64,
+    mut function: impl FnMut(f64) -> f64,
+) -> f64 {
+    let mut x = hi;
+    let mut last_was_low = None;
+    for step in 1..60 {
+        let secant = hi - at_hi * (hi - lo) / (at_hi - at_lo);
+        let is_inside = secant > lo && secant < hi && step % 3 != 0;
+        x = if is_inside { secant } else { lo.midpoint(hi) };
+        let y = function(x);
+        if y.abs() <= tolerance || hi - lo <= 1e-12 * (1.0 + hi.abs()) {
+            break;
+        }
+        let is_low = y < 0.0;
+        let again = last_was_low == Some(is_low);
+        last_was_low = Some(is_low);
+        if is_low {
+            (lo, at_lo) = (x, y);
+            at_hi *= if again { 0.5 } else { 1.0 };
+        } else {
+            (hi, at_hi) = (x, y);
+            at_lo *= if again { 0.5 } else { 1.0 };
+        }
+    }
+    x
+}
