@@ -167,23 +167,12 @@ pub(crate) fn lamp(args: &LightArgs, scene: Option<&Scene>) -> Result<Lamp> {
         return Ok(Lamp { name: None, light: Light::Directional { direction: AFTERNOON_SUN } });
     };
     let Some(name) = &args.light else {
-        if !scene.lights.is_empty() && scene.lights.iter().all(|l| l.light.is_none()) {
-            log::warn!(
-                "all of the scene's lights are point lights, which this version makes no \
-                 shadows of; a sun shines instead",
-            );
-        }
         let found = scene.default_light();
         let name = scene.lights.contains(&found).then_some(found.name);
-        // The scene promises a light that casts.
-        let light = found.light.unwrap_or(Light::Directional { direction: AFTERNOON_SUN });
-        return Ok(Lamp { name, light });
+        return Ok(Lamp { name, light: found.light });
     };
     let index = find("--light", "light", name, scene.lights.iter().map(|l| l.name.as_str()))?;
-    let light = scene.lights[index].light.ok_or_else(|| {
-        anyhow!("--light: `{name}` is a point light; this version makes shadows of directional and spot lights")
-    })?;
-    Ok(Lamp { name: Some(name.clone()), light })
+    Ok(Lamp { name: Some(name.clone()), light: scene.lights[index].light })
 }
 
 /// Index of `name` among `names`, or an error that lists them.

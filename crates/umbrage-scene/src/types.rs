@@ -124,8 +124,8 @@ pub struct SceneCamera {
 pub struct SceneLight {
     /// The file's name for it, or `light0`, `light1`, …
     pub name: String,
-    /// Where it shines; `None` for a point light, which shines everywhere.
-    pub light: Option<Light>,
+    /// Where it shines.
+    pub light: Light,
     /// Linear red, green, blue, largest 1.
     pub color: Vec3,
     /// As in the file: lux for directional lights, candela for the others.

@@ -52,6 +52,8 @@ fn assert_sound(scene: &Scene, what: &str) {
     for c in &scene.cameras {
         assert!(0.0 < c.near && c.near < c.far && c.far.is_finite(), "{what}");
         assert!((c.target - c.eye).length() > 0.0, "{what}");
+        let is_over = c.eye.cmpgt(bounds.min) & c.eye.cmplt(bounds.max);
+        assert!(is_over.x && is_over.z, "{what}: the eye at {} in {bounds:?}", c.eye);
     }
 }
 

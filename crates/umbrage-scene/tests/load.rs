@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-use umbrage::{Light, SpotLight};
+use umbrage::{Light, PointLight, SpotLight};
 use umbrage_scene::{Alpha, Scene, SceneError, Wrap, load};
 
 /// Sine and cosine of 45°, of quaternions that make a quarter turn.
@@ -449,9 +449,13 @@ fn lights_have_their_poses_and_sensible_ranges() {
     ]}});
     let scene = file.load().unwrap();
     let [point, spot, sun] = &scene.lights[..] else { panic!("{:?}", scene.lights) };
-    assert_eq!((point.name.as_str(), point.light), ("light0", None));
-    let Some(Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })) =
-        spot.light
+    let Light::Point(PointLight { position, near, range }) = point.light else {
+        panic!("{point:?}")
+    };
+    assert_eq!((point.name.as_str(), position), ("light0", DVec3::Y * 10.0));
+    assert!(range > 10.0 && range < 11.0, "to the farthest of the scene: {range}");
+    assert!(near > 0.0 && near < 0.1);
+    let Light::Spot(SpotLight { position, direction, half_angle_rad, near, range }) = spot.light
     else {
         panic!("{spot:?}")
     };
@@ -461,11 +465,76 @@ fn lights_have_their_poses_and_sensible_ranges() {
     assert!((half_angle_rad - 85f64.to_radians()).abs() < 1e-9, "as wide as may be");
     assert!(range > 10.0 && range < 11.0, "to the farthest of the scene: {range}");
     assert!(near > 0.0 && near < 0.1);
-    let Some(Light::Directional { direction }) = sun.light else { panic!("{sun:?}") };
+    let Light::Directional { direction } = sun.light else { panic!("{sun:?}") };
     assert!((direction - DVec3::NEG_Y).length() < 1e-6);
     assert_eq!((sun.color, sun.intensity), (Vec3::new(1.0, 0.5, 0.5), 1.0));
-    assert_eq!(scene.default_light().name, "lamp", "the first that has a direction");
-    assert!(notices(&scene)[0].contains("outerConeAngle"), "{:?}", notices(&scene));
+    assert_eq!(scene.default_light(), *point);
+    let [notice] = notices(&scene)[..] else { panic!("{:?}", notices(&scene)) };
+    assert!(notice.contains("outerConeAngle"), "{notice}");
+}
+
+/// A triangle, and a node 10 m above it that shines with each of `lights`.
+fn lit_by(lights: &Value) -> File {
+    let nodes: Vec<usize> = (0..=lights.as_array().unwrap().len()).collect();
+    let mut file = File::triangle().set("/scenes/0/nodes", json!(nodes));
+    for light in &nodes[1..] {
+        file.push(
+            "nodes",
+            json!({
+                "extensions": {"KHR_lights_punctual": {"light": light - 1}},
+                "translation": [0, 10, 0]
+            }),
+        );
+    }
+    file.set("/extensions", json!({"KHR_lights_punctual": {"lights": lights}}))
+}
+
+#[test]
+fn lamps_end_where_the_file_says_and_shadows_begin_nearby() {
+    let ranges = [8.0, 1e30, 1e-30, 0.0, -5.0];
+    let lights: Vec<Value> =
+        ranges.iter().map(|range| json!({"type": "point", "range": range})).collect();
+    let scene = lit_by(&json!(lights)).load().unwrap();
+    let found = scene.lights.iter().map(|l| match l.light {
+        Light::Point(point) => [point.near, point.range],
+        other => panic!("{other:?}"),
+    });
+    let found: Vec<[f64; 2]> = found.collect();
+    assert_eq!(found[0], [8e-3, 8.0]);
+    let endless = found[4][1];
+    assert!((10.0..11.0).contains(&endless), "{endless}");
+    // However far a lamp shines, there is nothing of the scene beyond.
+    assert_eq!(found[1], [1e-3 * endless, 1e12]);
+    assert_eq!(found[3], found[4]);
+    let camera = umbrage::Camera::look_at(umbrage::LookAt {
+        eye: DVec3::Z * 9.0,
+        target: DVec3::ZERO,
+        up: DVec3::Y,
+        fov_y_rad: 1.0,
+        near: 0.1,
+        far: 20.0,
+        image: [64, 64],
+    })
+    .unwrap();
+    for light in &scene.lights {
+        let options = umbrage::Options::default();
+        let mut planner = umbrage::Planner::new();
+        let bounds = umbrage::Bounds::of_scene(scene.bounds());
+        let plan = planner.plan(&camera, &[light.light], &bounds, &options);
+        assert!(plan.is_ok(), "{:?}: {plan:?}", light.light);
+    }
+}
+
+#[test]
+fn the_first_light_that_shines_is_the_scenes_own() {
+    let point =
+        |name: &str, intensity: f32| json!({"type": "point", "name": name, "intensity": intensity});
+    let own = |lights: Value| lit_by(&lights).load().unwrap().default_light();
+    let lights = json!([point("burnt out", 0.0), point("bulb", 3.0), {"type": "directional"}]);
+    assert_eq!(own(lights).name, "bulb");
+    // None shines: the sun does.
+    let sun = own(json!([point("burnt out", 0.0)]));
+    assert!(matches!(sun.light, Light::Directional { .. }), "{sun:?}");
 }
 
 #[test]

@@ -29,9 +29,7 @@ fn camera(view: &SceneCamera) -> Camera {
 }
 
 fn sun_elevation_deg(scene: &Scene) -> f64 {
-    let Some(Light::Directional { direction }) = scene.default_light().light else {
-        panic!("not a sun")
-    };
+    let Light::Directional { direction } = scene.default_light().light else { panic!("not a sun") };
     (-direction.normalize().y).asin().to_degrees()
 }
 
@@ -144,7 +142,7 @@ fn scenes_of_nothing_or_of_a_point_get_a_valid_view_and_sun() {
     empty.name = "empty".into();
     for scene in [empty, point, flat] {
         camera(&scene.default_view());
-        let light = scene.default_light().light.unwrap();
+        let light = scene.default_light().light;
         assert!(light.direction_to_light(DVec3::ZERO).y > 0.0, "{}: {light:?}", scene.name);
     }
 }

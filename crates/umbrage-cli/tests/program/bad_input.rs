@@ -165,7 +165,6 @@ fn names_of_a_scenes_cameras_and_lights() {
     for (option, name, expected) in [
         ("--camera", "back", "--camera: the scene has no camera `back`; there are front, above"),
         ("--light", "moon", "--light: the scene has no light `moon`; there are noon, torch, bulb"),
-        ("--light", "bulb", "--light: `bulb` is a point light"),
     ] {
         for command in [
             &["render", "stage.gltf", "-o", "p.png"][..],

@@ -4,6 +4,7 @@ mod airfield;
 pub mod closed_form;
 mod fence;
 mod grove;
+mod lantern;
 mod mesh_builder;
 mod plants;
 mod stage;
@@ -72,6 +73,14 @@ const BUILTINS: &[BuiltinInfo] = &[
         build: fence::fence,
     },
     BuiltinInfo {
+        name: "lantern",
+        about: "A hall of columns around a lantern of iron wire, lit by its flame, a point light",
+        size_means: "rows of columns on each side of the lantern",
+        default_size: 2,
+        max_size: 200,
+        build: lantern::lantern,
+    },
+    BuiltinInfo {
         name: "pole",
         about: "A square pole on a plane; its shadow has a closed form",
         size_means: "quads along each edge of ground and pole",
@@ -102,7 +111,7 @@ pub fn builtins() -> &'static [BuiltinInfo] {
     BUILTINS
 }
 
-/// A built-in scene: deterministic, with its own camera and sun. `size` is 1 to
+/// A built-in scene: deterministic, with its own camera and light. `size` is 1 to
 /// [`BuiltinInfo::max_size`] and counts what [`BuiltinInfo::size_means`] says; `None` is
 /// [`BuiltinInfo::default_size`].
 ///

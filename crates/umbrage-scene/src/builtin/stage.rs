@@ -1,7 +1,7 @@
 use super::mesh_builder::MeshBuilder;
 use crate::types::{Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId};
 use glam::{DAffine3, DVec3, Vec3, Vec4};
-use umbrage::Light;
+use umbrage::{Light, PointLight};
 
 /// A scene under construction.
 pub(super) struct Stage {
@@ -92,9 +92,19 @@ impl Stage {
     pub(super) fn sun(&mut self, direction: DVec3) {
         self.scene.lights.push(SceneLight {
             name: "sun".into(),
-            light: Some(Light::Directional { direction: direction.normalize() }),
+            light: Light::Directional { direction: direction.normalize() },
             color: Vec3::new(1.0, 0.93, 0.82),
             intensity: 100_000.0,
+        });
+    }
+
+    /// The warm light of a flame.
+    pub(super) fn flame(&mut self, name: &str, light: PointLight) {
+        self.scene.lights.push(SceneLight {
+            name: name.into(),
+            light: Light::Point(light),
+            color: Vec3::new(1.0, 0.78, 0.48),
+            intensity: 300.0,
         });
     }
 }

@@ -7,13 +7,16 @@ use glam::{DAffine3, DVec3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::Type;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, camera};
-use umbrage::{Aabb, Light, SpotLight};
+use umbrage::{Aabb, Light, PointLight, SpotLight};
 
 /// Widest half angle of a spot light, radians: that of [`SpotLight::half_angle_rad`].
 const MAX_HALF_ANGLE_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
 
-/// Shadows of spot lights begin at this share of their range: a centimetre for a lamp of 10 m.
-const SPOT_NEAR_SHARE: f64 = 1e-3;
+/// Shadows of lamps begin at this share of how far they shine: a centimetre for a lamp of 10 m.
+const NEAR_SHARE: f64 = 1e-3;
+
+/// Ranges of lamps, metres: those whose near distances the planner takes, and its world's end.
+const RANGES: [f64; 2] = [1e-9, 1e12];
 
 /// The camera of a node, or `None` with a notice if it cannot be one of ours. `bounds` are the
 /// scene's: where they end, an endless view ends.
@@ -81,18 +84,19 @@ pub(super) fn load_light(
         return Err(document.invalid(&place, "colour, intensity or range is not finite"));
     }
     let direction = (-world_from_node.matrix3.z_axis).try_normalize();
+    let position = world_from_node.translation;
+    let [near, range] = near_and_range(json.range, farthest(bounds, |p| p.distance(position)));
     let light = match (kind, direction) {
-        (Type::Point, _) => None,
+        (Type::Point, _) => Light::Point(PointLight { position, near, range }),
         (_, None) => {
             notices.add(&place, "its node has no direction (scale 0), left out");
             return Ok(None);
         }
-        (Type::Directional, Some(direction)) => Some(Light::Directional { direction }),
+        (Type::Directional, Some(direction)) => Light::Directional { direction },
         (Type::Spot, Some(direction)) => {
             let Some(cone) = &json.spot else {
                 return Err(document.invalid(&place, "is a spot light without a cone"));
             };
-            let position = world_from_node.translation;
             let outer = f64::from(cone.outer_cone_angle);
             if !(outer > 0.0 && outer <= MAX_HALF_ANGLE_RAD) {
                 notices.add(
@@ -100,17 +104,8 @@ pub(super) fn load_light(
                     "outerConeAngle must lie above 0° and at most at 85°, moved there",
                 );
             }
-            let range = match json.range.map(f64::from) {
-                Some(range) if range > 0.0 && range.is_finite() => range,
-                _ => farthest(bounds, |p| p.distance(position)).max(1e-3),
-            };
-            Some(Light::Spot(SpotLight {
-                position,
-                direction,
-                half_angle_rad: outer.clamp(1e-3, MAX_HALF_ANGLE_RAD),
-                near: range * SPOT_NEAR_SHARE,
-                range,
-            }))
+            let half_angle_rad = outer.clamp(1e-3, MAX_HALF_ANGLE_RAD);
+            Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })
         }
     };
     let color = color.max(Vec3::ZERO);
@@ -121,6 +116,18 @@ pub(super) fn load_light(
         color: if brightest > 0.0 { color / brightest } else { Vec3::ONE },
         intensity: (json.intensity * brightest).max(0.0),
     }))
+}
+
+/// Where a lamp's shadows begin and where its light ends, metres. Without a range it shines as far as
+/// there is something: `reach` metres. A range beyond that lets no shadow begin later.
+fn near_and_range(range: Option<f32>, reach: f64) -> [f64; 2] {
+    let [least, most] = RANGES;
+    let reach = reach.clamp(1e-3, most);
+    let range = match range.map(f64::from) {
+        Some(range) if range > 0.0 => range.clamp(least, most),
+        _ => reach,
+    };
+    [range.min(reach) * NEAR_SHARE, range]
 }
 
 /// The largest value that `distance` has in a box, a little rounded up.

@@ -28,14 +28,21 @@ pub(super) fn lighting(
             Some(eye + direction * (sight.distance - back).max(0.0))
         })
         .collect();
-    let reaches = |p: DVec3, light: DVec3| grid.look(p, light - p).is_none_or(|s| s.distance > 1.0);
+    // What is this near a lamp does not hide it: it hangs in a cage, or under a shade.
+    let housing = 3.0 * grid.cell.max_element();
+    let reaches = |p: DVec3, lamp: DVec3| {
+        let to_lamp = lamp - p;
+        let is_beyond = |share: f64| (1.0 - share) * to_lamp.length() < housing;
+        grid.look(p, to_lamp).is_none_or(|s| is_beyond(s.distance))
+    };
     // How good a light is, and the share of what is seen that it leaves dark.
     let judge = |light: &Light| {
         let is_lit = |p: DVec3| match light {
             Light::Directional { direction } => grid.look(p, -*direction).is_none(),
             Light::Spot(spot) => {
-                let to_light = spot.position - p;
-                spot.direction.angle_between(-to_light) < spot.half_angle_rad
+                let from_lamp = p - spot.position;
+                spot.direction.angle_between(from_lamp) < spot.half_angle_rad
+                    && spot.direction.normalize_or_zero().dot(from_lamp) <= spot.range
                     && reaches(p, spot.position)
             }
             Light::Point(point) => {
@@ -81,4 +88,26 @@ pub(super) fn towards_sun(forward: DVec3, azimuth_deg: f64, elevation_deg: f64) 
     let (sin, cos) = elevation_deg.to_radians().sin_cos();
     let ahead = forward.with_y(0.0).normalize_or(DVec3::NEG_Z);
     DQuat::from_rotation_y(azimuth_deg.to_radians()) * ahead * cos + DVec3::Y * sin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbrage::PointLight;
+
+    #[test]
+    fn a_lamp_shines_out_of_its_cage() {
+        let scene = crate::builtin("lantern", None).unwrap();
+        let grid = Occupancy::of(&scene, scene.bounds());
+        let view = &scene.cameras[0];
+        let Light::Point(flame) = scene.lights[0].light else { panic!("{:?}", scene.lights) };
+        let score = |range: f64| {
+            let lamp = Light::Point(PointLight { range, ..flame });
+            lighting(&grid, Some(lamp), view.eye, view.target, view.fov_y_rad).score
+        };
+        // A lamp that reaches nothing leaves all dark, without an edge.
+        let dark = score(0.06);
+        assert!((dark + 0.6).abs() < 1e-9, "{dark}");
+        assert!(score(flame.range) > 0.0, "{}", score(flame.range));
+    }
 }

@@ -38,13 +38,13 @@ impl Scene {
             b if b.is_empty() => {
                 camera(DVec3::new(0.0, 1.0, 3.0), DVec3::ZERO, WIDE_RAD, 0.1, 100.0)
             }
-            b => compose(&Occupancy::of(self, b), b, self.own_light().and_then(|l| l.light)),
+            b => compose(&Occupancy::of(self, b), b, self.own_light().map(|l| l.light)),
         })
     }
 
-    /// The scene's first light that casts shadows from one direction or into one cone, else an
-    /// afternoon sun that suits [`default_view`](Self::default_view). It stands 45° high, lower only
-    /// over land so gentle that no shadows would fall.
+    /// The scene's first light that shines at all (intensity above 0), else an afternoon sun that
+    /// suits [`default_view`](Self::default_view). It stands 45° high, lower only over land so gentle
+    /// that no shadows would fall.
     pub fn default_light(&self) -> SceneLight {
         self.light_for_view(&self.default_view())
     }
@@ -64,7 +64,7 @@ impl Scene {
             };
             SceneLight {
                 name: "sun".into(),
-                light: Some(light),
+                light,
                 color: Vec3::new(1.0, 0.95, 0.86),
                 intensity: 100_000.0,
             }
@@ -72,7 +72,7 @@ impl Scene {
     }
 
     fn own_light(&self) -> Option<&SceneLight> {
-        self.lights.iter().find(|l| l.light.is_some() && l.intensity > 0.0)
+        self.lights.iter().find(|l| l.intensity > 0.0)
     }
 }
 
