@@ -40,7 +40,7 @@ impl Faces {
         let is_behind = along_view <= 0.0;
         let is_used = std::array::from_fn(|i| {
             let inwards = rays[(i + 1) % 4].cross(rays[i]).normalize();
-            let inside = -inwards.dot(towards) / towards.length();
+            let inside = inwards.dot(towards) / towards.length();
             if is_behind { inside < -EDGE_ON } else { inside > EDGE_ON }
         });
         // The near face is one of those used unless it is edge-on or a lamp stands before it.

@@ -2,13 +2,24 @@
 
 mod common;
 
-use common::{WARPS, config, options};
+use common::{WARPS, config, options, partition, possible};
 use glam::DVec3;
 use proptest::prelude::*;
-use umbrage::{Aabb, Light, Objective, Planner, Warp};
+use umbrage::{Aabb, Faces, Light, Objective, Options, Partition, Planner, Warp};
 
 fn numbers() -> impl Strategy<Value = Vec<[f64; 3]>> {
     proptest::collection::vec([0.0..=1.0f64, 0.0..=1.0, 0.0..=1.0], 24)
+}
+
+/// How many maps there must be.
+fn map_count(partition: &Partition, light: &Light) -> usize {
+    let slices = partition.slices as usize;
+    let maps = match partition.faces {
+        Faces::Whole => slices,
+        Faces::Sides => 4 * slices,
+        Faces::SidesAndNear => 4 * slices + 1,
+    };
+    if matches!(light, Light::Point(_)) { 6 * maps } else { maps }
 }
 
 proptest! {
@@ -17,22 +28,35 @@ proptest! {
     /// Every receiver lands in the map; its casters share its texel, lie nearer the light and are not
     /// culled; no point's error exceeds the reported maximum.
     #[test]
-    fn receivers_casters_and_errors(config in config(), numbers in numbers(), pick in 0..WARPS.len()) {
+    fn receivers_casters_and_errors(
+        config in config(),
+        partition in partition(),
+        numbers in numbers(),
+        pick in 0..WARPS.len(),
+    ) {
         let (name, warp) = WARPS[pick];
         let mut planner = Planner::new();
-        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
-        let map = &plan.maps[0];
-        prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite(), "{name}");
-        let seen = config.seen_points(&numbers);
-        if map.is_empty() {
-            prop_assert!(seen.is_empty(), "{name}: an empty map for a view that sees something");
-            return Ok(());
+        let partition = possible(partition, warp);
+        let options = Options { partition, ..options(warp) };
+        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+        let name = format!("{name} {partition:?}");
+        let maps = map_count(&partition, &config.light);
+        prop_assert_eq!((plan.maps.len(), plan.lights[0].maps.clone()), (maps, 0..maps));
+        for map in &plan.maps {
+            prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite(), "{name}");
         }
-        prop_assert!(map.texels() <= 1 << 20);
-        let [res_s, res_t] = map.resolution.map(f64::from);
+        let seen = config.seen_points(&numbers);
+        prop_assert!(plan.texels() <= 1 << 20);
         // World coordinates carry rounding of their own, worth this much of the scene.
         let rounding = config.camera.eye().abs().max_element() * 1e-15;
-        for p in seen {
+        let answers = seen.into_iter().flat_map(|p| {
+            let shares: f64 = plan.lookup(0, p).map(|(_, share)| share).sum();
+            assert!((shares - 1.0).abs() < 1e-9, "{name}: shares of {shares} at {p}");
+            plan.lookup(0, p).map(move |(index, _)| (p, index))
+        });
+        for (p, index) in answers {
+            let map = &plan.maps[index];
+            let [res_s, res_t] = map.resolution.map(f64::from);
             let Some(shadow) = map.project(p) else {
                 return Err(TestCaseError::fail(format!("{name}: {p} is behind the map")));
             };

@@ -4,12 +4,14 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Plane, Size, SpotLight, Warp,
+    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Plane, PointLight,
+    Size, Splits, SpotLight, Warp,
 };
 
 /// Every warp, by name.
-pub(crate) const WARPS: [(&str, Warp); 10] = [
+pub(crate) const WARPS: [(&str, Warp); 11] = [
     ("unfocused", Warp::Unfocused),
+    ("stable", Warp::Stable),
     ("uniform", Warp::Uniform),
     ("psm", Warp::Psm),
     ("lispsm", Warp::Lispsm),
@@ -73,6 +75,37 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
         })
 }
 
+/// Partitions of every kind, one in three none at all.
+pub(crate) fn partition() -> impl Strategy<Value = Partition> {
+    let splits = prop_oneof![
+        3 => Just(Splits::SelfSimilar),
+        1 => (0.0..=1.0f64).prop_map(Splits::Practical),
+        1 => Just(Splits::Fitted),
+        1 => (log_range(0.01, 10.0), 1.01..3.0f64).prop_map(|(first, ratio)| {
+            Splits::At(std::array::from_fn(|i| first * ratio.powi(i as i32)))
+        }),
+    ];
+    let overlap = prop_oneof![2 => Just(0.0), 1 => 0.0..=1.0f64];
+    let faces = prop_oneof![
+        2 => Just(Faces::Whole),
+        1 => Just(Faces::Sides),
+        1 => Just(Faces::SidesAndNear),
+    ];
+    let some = (1u32..=16, splits, overlap, faces)
+        .prop_map(|(slices, splits, overlap, faces)| Partition { slices, splits, overlap, faces });
+    prop_oneof![1 => Just(Partition::default()), 2 => some]
+}
+
+/// `partition`, or as much of it as this warp can have.
+pub(crate) fn possible(partition: Partition, warp: Warp) -> Partition {
+    if warp != Warp::Stable {
+        return partition;
+    }
+    let is_fitted = partition.splits == Splits::Fitted;
+    let splits = if is_fitted { Splits::SelfSimilar } else { partition.splits };
+    Partition { splits, faces: Faces::Whole, ..partition }
+}
+
 /// A direction anywhere, or within a hair of the view or of its opposite.
 fn sun(camera: Camera) -> impl Strategy<Value = Light> {
     prop_oneof![
@@ -102,9 +135,27 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     )
 }
 
+/// A point light amid the view or outside it.
+fn point(camera: Camera) -> impl Strategy<Value = Light> {
+    ([0.0..1.0f64, 0.0..1.0, 0.0..1.0], direction(), log_range(1e-3, 3.0)).prop_map(
+        move |(place, away, distance)| {
+            let distance = distance * camera.far();
+            Light::Point(PointLight {
+                position: point_in_view(&camera, place) + away * distance,
+                near: distance * 0.01,
+                range: distance * 3.0,
+            })
+        },
+    )
+}
+
 pub(crate) fn config() -> impl Strategy<Value = Config> {
     camera().prop_flat_map(|camera| {
-        let light = prop_oneof![3 => sun(camera).boxed(), 1 => spot(camera).boxed()];
+        let light = prop_oneof![
+            3 => sun(camera).boxed(),
+            1 => spot(camera).boxed(),
+            1 => point(camera).boxed(),
+        ];
         let unit = || [0.0..1.0f64, 0.0..1.0, 0.0..1.0];
         let receivers =
             proptest::option::of((unit(), unit(), 0usize..4).prop_map(move |(a, b, flat)| {
@@ -178,7 +229,10 @@ impl Config {
                 r.dot(spot.direction)
                     > r.length() * spot.direction.length() * spot.half_angle_rad.cos()
             }
-            Light::Point(point) => world.distance(point.position) <= point.range,
+            Light::Point(point) => {
+                let r = world - point.position;
+                r.length() <= point.range && r.abs().max_element() >= point.near
+            }
         }
     }
 
