@@ -138,9 +138,11 @@ struct Packing {
 }
 
 impl Packing {
-    /// What to make small: the area, then the longer side.
-    fn cost(&self) -> (u64, u32) {
-        (area(self.size), self.size[0].max(self.size[1]))
+    /// What to make small: the area, times a little more for every step away from a square. Long
+    /// strips reach a device's limits first.
+    fn cost(&self) -> f64 {
+        let [w, h] = self.size.map(f64::from);
+        w * h * (1.0 + STRIP_COST * (w.max(h) / w.min(h) - 1.0))
     }
 }
 
@@ -178,10 +180,12 @@ impl Boxes {
         if texels == 0 {
             return Some(Packing { size: [0, 0], corners: Vec::new() });
         }
-        // Beyond 2 : 1 either way nothing is gained but length.
+        // From half as wide as the side of a square that had no gaps to twice as wide; more of these for
+        // few maps, whose shapes matter most.
         let side = (texels as f64).sqrt();
-        let widths = (0..WIDTHS).map(|i| {
-            let ratio = (f64::from(i) / f64::from(WIDTHS - 1) * 2.0 - 1.0).exp2();
+        let steps = (PATIENCE / self.list.len()).clamp(2, 24) as i32;
+        let widths = (-steps..=steps).map(|i| {
+            let ratio = (f64::from(i) / f64::from(steps)).exp2();
             ((side * ratio).ceil() as u32).clamp(widest, self.max_side)
         });
         let mut widths: Vec<u32> = widths.collect();
@@ -192,9 +196,10 @@ impl Boxes {
             sorted.sort_by_key(|&i| std::cmp::Reverse(order(self.list[i].1)));
             for &width in &widths {
                 let mut low = highest.max(texels.div_ceil(width.into()).try_into().ok()?);
-                // Higher than this is no better than the best so far.
-                let bound = best.as_ref().map_or(u64::MAX, |b| b.cost().0 / u64::from(width));
-                let mut high = self.max_side.min(bound.try_into().unwrap_or(u32::MAX));
+                // Much higher than this is no better than the best so far. (As not all of the width
+                // need be used, a little higher may be.)
+                let bound = best.as_ref().map_or(f64::MAX, |b| 1.1 * b.cost() / f64::from(width));
+                let mut high = self.max_side.min(bound as u32);
                 while low <= high {
                     let height = low.midpoint(high.min(low.saturating_mul(2)));
                     match self.pack_into([width, height], &sorted) {
@@ -229,8 +234,10 @@ impl Boxes {
     }
 }
 
-/// Widths tried in each order.
-const WIDTHS: u32 = 24;
+/// What a strip of 2 : 1 may be larger than a square, as a share.
+const STRIP_COST: f64 = 0.02;
+/// The search is coarser for more maps than this.
+const PATIENCE: usize = 1024;
 /// Heights closer than one part in this many are not told apart.
 const FINENESS: u32 = 64;
 
@@ -246,7 +253,3 @@ const BEST_FIT: AllocatorOptions = AllocatorOptions {
     large_size_threshold: i32::MAX,
     ..DEFAULT_OPTIONS
 };
-
-fn area([w, h]: [u32; 2]) -> u64 {
-    u64::from(w) * u64::from(h)
-}
