@@ -32,8 +32,8 @@ pub struct Sample {
     pub surface: Surface,
     /// Distance along the view direction, metres.
     pub depth: f64,
-    /// Whether the seen side of the triangle faces the light and is within its reach (a spot light's
-    /// cone and range): if not it is dark, whatever any shadow map says. Decided by the geometric
+    /// Whether the seen side of the triangle faces the light and is within its reach (a lamp's range, a
+    /// spot light's cone): if not it is dark, whatever any shadow map says. Decided by the geometric
     /// normal, for the triangle is what casts and receives.
     pub is_facing: bool,
 }
@@ -117,8 +117,8 @@ impl<'a> View<'a> {
 
     /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
     ///
-    /// All that lies before a spot light casts, its own housing too; what is nearer to it than
-    /// `near` gets no shadow, as [`SpotLight`](umbrage::SpotLight) has it.
+    /// All that lies before a lamp casts, its own housing too; what is nearer to it than `near` gets no
+    /// shadow, as [`SpotLight`] and [`PointLight`] have it.
     pub fn truth(&self, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;

@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Random, at, camera, even_map, ground, nobody, scene, sheet, towards};
-use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use umbrage::visibility::{Filter, visibility};
 use umbrage::{
-    Bounds, Camera, Light, Objective, Options, Plan, Planner, Rows, ShadowMap, Size, SpotLight,
-    Warp,
+    Bounds, Camera, CubeSide, Light, Objective, Options, Plan, Planner, PointLight, Rows,
+    ShadowMap, Size, SpotLight, Warp,
 };
 use umbrage_scene::closed_form::pole_shadows;
 use umbrage_scene::{Scene, builtin};
@@ -30,7 +30,11 @@ fn filters() -> [Filter; 5] {
 }
 
 fn plan(camera: &Camera, light: &Light, tracer: &Tracer<'_>, warp: Warp, texels: u64) -> Plan {
-    let options = Options { warp, size: Size::Budget(texels), ..Options::default() };
+    sized(camera, light, tracer, warp, Size::Budget(texels))
+}
+
+fn sized(camera: &Camera, light: &Light, tracer: &Tracer<'_>, warp: Warp, size: Size) -> Plan {
+    let options = Options { warp, size, ..Options::default() };
     let bounds = Bounds::of_scene(tracer.bounds());
     Planner::new().plan(camera, &[*light], &bounds, &options).unwrap().clone()
 }
@@ -230,6 +234,50 @@ fn every_warp_approaches_the_truth() {
 }
 
 #[test]
+fn all_sides_of_a_point_light_approach_the_truth() {
+    let scene = builtin("lantern", Some(1)).unwrap();
+    let tracer = Tracer::new(&scene).unwrap();
+    let light = scene.lights[0].light;
+    let Light::Point(flame) = light else { panic!("{light:?}") };
+    // From opposite corners, up and down past the lantern: all that it shines on is seen.
+    let views = [([-2.6, 0.3, 2.6], 3.5), ([2.6, 4.3, -2.6], 1.0)];
+    let cameras = views.map(|(eye, height)| {
+        let look = camera(DVec3::from(eye), DVec3::Y * height, [160, 120]);
+        look.with_depth_range(0.2, 20.0).unwrap()
+    });
+    for warp in WARPS {
+        // For each side of the cube: samples, and those wrong with few texels and with many.
+        let mut counts = [[0; 3]; 6];
+        for camera in &cameras {
+            let view = View::new(&tracer, *camera, light, 1).unwrap();
+            let band = view.band(0..120, &nobody);
+            let [coarse, fine] =
+                [16, 256].map(|n| sized(camera, &light, &tracer, warp, Size::Exact([n, n])));
+            let render = |plan| Reference::render(&tracer, plan, Filter::Hard, &nobody).unwrap();
+            let references = [render(&coarse), render(&fine)];
+            for sample in band.samples().iter().flatten().filter(|s| s.is_facing) {
+                let from_light = sample.surface.position - flame.position;
+                let along = |side: &CubeSide| side.direction().dot(from_light);
+                let side = (0..6)
+                    .max_by(|&a, &b| along(&CubeSide::ALL[a]).total_cmp(&along(&CubeSide::ALL[b])));
+                let counts = &mut counts[side.unwrap()];
+                counts[0] += 1;
+                let truth = view.truth(sample);
+                for (k, reference) in references.iter().enumerate() {
+                    let difference = (reference.visibility(0, sample) - truth).abs();
+                    counts[k + 1] += usize::from(difference > 0.5);
+                }
+            }
+        }
+        for (side, [all, coarse, fine]) in CubeSide::ALL.iter().zip(counts) {
+            let what = format!("{warp:?} {side:?}: {coarse}, then {fine} of {all} are wrong");
+            assert!(all > 3000 && coarse > all / 10, "{what}");
+            assert!(fine < all / 10 && 5 * fine < 2 * coarse, "{what}");
+        }
+    }
+}
+
+#[test]
 fn flat_ground_is_lit_under_every_plan() {
     // Whatever camera, light and warp: nothing casts, so nothing is dark.
     let mut random = Random(31);
@@ -258,6 +306,46 @@ fn flat_ground_is_lit_under_every_plan() {
             }
         }
     }
+}
+
+#[test]
+fn a_plane_is_lit_all_around_a_point_light() {
+    // Nothing casts, so nothing is dark, least of all where sides of the cube meet.
+    let mut random = Random(33);
+    let mut sides = [0; 6];
+    for round in 0..60 {
+        let normal = random.direction();
+        let turn = DQuat::from_rotation_arc(DVec3::Y, normal);
+        let plane = (0, DAffine3::from_quat(turn));
+        let scene = scene(vec![ground(50.0)], &[plane]);
+        let tracer = Tracer::new(&scene).unwrap();
+        let mut above = |half: f64, low: f64, high: f64| {
+            let at = random.in_square(half);
+            turn * DVec3::new(at.x, random.between(low, high), at.y)
+        };
+        let (position, eye, target) =
+            (above(3.0, 0.1, 4.0), above(8.0, 0.5, 6.0), above(8.0, -1.0, 0.2));
+        let look = camera(eye, target, [24, 18]).with_depth_range(0.1, 40.0).unwrap();
+        let light = Light::Point(PointLight { position, near: 0.01, range: 60.0 });
+        let view = View::new(&tracer, look, light, 1).unwrap();
+        let band = view.band(0..18, &nobody);
+        let warp = WARPS[round % WARPS.len()];
+        let plan = sized(&look, &light, &tracer, warp, Size::Exact([24, 24]));
+        for filter in filters() {
+            let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
+            let facing = band.samples().iter().flatten().filter(|s| s.is_facing && s.depth < 39.9);
+            for sample in facing {
+                assert_eq!(view.truth(sample), 1.0, "{light:?} {sample:?}");
+                let place = reference.texel(0, sample.surface.position);
+                let Some(place) = place else { panic!("{warp:?}: no map for {sample:?}") };
+                let side = plan.maps[place.map].part.side;
+                sides[CubeSide::ALL.iter().position(|s| Some(*s) == side).unwrap()] += 1;
+                let lit = reference.visibility(0, sample);
+                assert_eq!(lit, 1.0, "{warp:?} {filter}: {light:?} {sample:?}");
+            }
+        }
+    }
+    assert!(sides.iter().all(|&n| n > 500), "{sides:?}");
 }
 
 #[test]

@@ -4,10 +4,12 @@ mod common;
 
 use common::{Random, at, below, camera, ground, nobody, scene, sheet, soup, towards};
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
-use umbrage::{Light, SpotLight};
-use umbrage_scene::closed_form::{SPHERE_RADIUS, pole_shadows, slit_shadows, sphere_shadows};
+use umbrage::{Light, PointLight, SpotLight};
+use umbrage_scene::closed_form::{
+    POLE_HEIGHT, SPHERE_CENTER, SPHERE_RADIUS, pole_shadows, slit_shadows, sphere_shadows,
+};
 use umbrage_scene::{Mesh, Scene, builtin};
-use umbrage_trace::{Band, Ray, Surface, Tracer, View};
+use umbrage_trace::{Band, Ray, Sample, Surface, Tracer, View};
 
 fn sun_is_hidden(tracer: &Tracer<'_>, surface: &Surface, travel: DVec3) -> bool {
     tracer.occluded_from(surface, -travel, f64::INFINITY)
@@ -94,8 +96,7 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
         dark += usize::from(is_hidden);
         let ideal = sphere_shadows(surface.position, travel);
         // The same test for a sphere smaller by the sagitta, around the same centre.
-        let center = DVec3::new(0.0, 2.0, 0.0);
-        let smaller = (center - surface.position).cross(travel.normalize()).length()
+        let smaller = (SPHERE_CENTER - surface.position).cross(travel.normalize()).length()
             <= SPHERE_RADIUS - 1.1 * sagitta;
         between += usize::from(ideal != smaller);
         assert!(!smaller || is_hidden, "{surface:?} {travel}");
@@ -235,6 +236,14 @@ fn curved_shells_do_not_leak() {
     }
 }
 
+/// Whether the ground right above or below an eye faces a light, and whether light reaches it.
+fn seen(tracer: &Tracer<'_>, light: Light, eye: DVec3) -> (bool, f32) {
+    let view = View::new(tracer, camera(eye, eye.with_y(0.0), [1, 1]), light, 1).unwrap();
+    let sample = view.sample(DVec2::splat(0.5)).unwrap();
+    assert_eq!(sample.surface.position.y, 0.0);
+    (sample.is_facing, view.truth(&sample))
+}
+
 #[test]
 fn spot_lights_end_at_cone_and_range_and_begin_at_near() {
     let shade = |half: f32, y: f32| {
@@ -254,21 +263,9 @@ fn spot_lights_end_at_cone_and_range_and_begin_at_near() {
             range,
         })
     };
-    let lit = |light: Light, x: f64| {
-        let camera = camera(DVec3::new(x, -3.0, 0.0), DVec3::new(x, 0.0, 0.0), [1, 1]);
-        let view = View::new(&tracer, camera, light, 1).unwrap();
-        let sample = view.sample(DVec2::splat(0.5)).unwrap();
-        (sample.is_facing, view.truth(&sample))
-    };
     // Seen from below, the ground's lower side faces away from a light above it.
-    assert_eq!(lit(spot(0.1, 50.0), 5.0), (false, 0.0));
-    let above = |light: Light, x: f64| {
-        let camera = camera(DVec3::new(x, 3.0, 0.0), DVec3::new(x, 0.0, 0.0), [1, 1]);
-        let view = View::new(&tracer, camera, light, 1).unwrap();
-        let sample = view.sample(DVec2::splat(0.5)).unwrap();
-        assert_eq!(sample.surface.position.y, 0.0);
-        (sample.is_facing, view.truth(&sample))
-    };
+    assert_eq!(seen(&tracer, spot(0.1, 50.0), DVec3::new(5.0, -3.0, 0.0)), (false, 0.0));
+    let above = |light, x| seen(&tracer, light, DVec3::new(x, 3.0, 0.0));
     assert_eq!(above(spot(0.1, 50.0), 5.0), (true, 1.0));
     assert_eq!(above(spot(0.1, 50.0), 0.99), (true, 0.0), "under the sheet at half height");
     assert_eq!(above(spot(0.1, 50.0), 1.01), (true, 1.0), "beside it");
@@ -277,6 +274,118 @@ fn spot_lights_end_at_cone_and_range_and_begin_at_near() {
     assert!(!above(spot(0.1, 9.99), 5.0).0, "beyond the range");
     assert_eq!(above(spot(6.0, 50.0), 0.5), (true, 0.0), "a caster nearer than near");
     assert_eq!(above(spot(10.01, 50.0), 0.5), (true, 1.0), "a receiver nearer than near");
+}
+
+#[test]
+fn point_lights_end_at_a_sphere_and_begin_at_a_cube() {
+    let sheet_at = |y: f32| sheet(Vec3::new(-0.5, y, -0.5), Vec3::Z, Vec3::X);
+    let scene = scene(
+        vec![ground(20.0), sheet_at(5.0), sheet_at(15.0), ground(20.0)],
+        &[
+            (0, DAffine3::IDENTITY),
+            (1, DAffine3::IDENTITY),
+            (2, DAffine3::IDENTITY),
+            (3, at(0.0, 20.0, 0.0)),
+        ],
+    );
+    let tracer = Tracer::new(&scene).unwrap();
+    let point = |near: f64, range: f64| {
+        Light::Point(PointLight { position: DVec3::new(0.0, 10.0, 0.0), near, range })
+    };
+    let lit = |light, x: f64, z: f64| seen(&tracer, light, DVec3::new(x, 3.0, z));
+    assert_eq!(lit(point(0.1, 50.0), 15.0, -15.0), (true, 1.0));
+    assert_eq!(lit(point(0.1, 50.0), 0.99, 0.99), (true, 0.0), "under the sheet at half height");
+    assert_eq!(lit(point(0.1, 50.0), 1.01, 0.0), (true, 1.0), "beside it");
+    let below = seen(&tracer, point(0.1, 50.0), DVec3::new(5.0, -3.0, 0.0));
+    assert_eq!(below, (false, 0.0), "the ground's other side");
+    // 10² + 10² + 5² = 15².
+    assert!(lit(point(0.1, 15.0 + 1e-9), 10.0, 5.0).0);
+    assert!(!lit(point(0.1, 15.0 - 1e-9), 10.0, 5.0).0, "beyond the range");
+    assert_eq!(lit(point(6.0, 50.0), 0.5, 0.0), (true, 0.0), "a caster nearer than near");
+    assert_eq!(lit(point(10.01, 50.0), 0.5, 0.0), (true, 1.0), "a receiver nearer than near");
+    // Along the nearest axis it is farther than 12 m away, along that to the ground it is not.
+    assert_eq!(lit(point(12.0, 50.0), 0.5, 11.99), (true, 1.0));
+    let above = |x: f64| {
+        let eye = DVec3::new(x, 16.0, 0.0);
+        let camera = camera(eye, eye.with_y(20.0), [1, 1]);
+        let view = View::new(&tracer, camera, point(0.1, 50.0), 1).unwrap();
+        let sample = view.sample(DVec2::splat(0.5)).unwrap();
+        assert_eq!(sample.surface.position.y, 20.0);
+        (sample.is_facing, view.truth(&sample))
+    };
+    assert_eq!([above(0.99), above(1.01)], [(true, 0.0), (true, 1.0)], "upwards, too");
+}
+
+/// Whether a ground point is dark in the light of a lamp, whose range and facing are not asked for.
+fn lamp_is_hidden(tracer: &Tracer<'_>, at: DVec2, position: DVec3) -> bool {
+    let light = Light::Point(PointLight { position, near: 1e-9, range: 1e9 });
+    let view = View::new(tracer, camera(DVec3::Y, DVec3::ZERO, [1, 1]), light, 1).unwrap();
+    // From below, where nothing hides the ground.
+    let surface = towards(tracer, DVec3::new(at.x, -1.0, at.y), DVec3::Y);
+    assert_eq!(surface.position.y, 0.0);
+    view.truth(&Sample { surface, depth: 1.0, is_facing: true }) == 0.0
+}
+
+#[test]
+fn the_shadow_of_a_pole_widens_away_from_a_lamp() {
+    let scene = builtin("pole", None).unwrap();
+    let tracer = Tracer::new(&scene).unwrap();
+    let half = f64::from(0.1f32);
+    // Whichever way the lamp lies of the pole, on each side of the cube around it.
+    for quarter in 0..4 {
+        let turned = DMat3::from_rotation_y(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
+        // Single precision is enough for the turn: outlines are stepped over by more.
+        let is_hidden = |x: f64, z: f64, lamp: DVec3| {
+            let p = turned * DVec3::new(x, 0.0, z);
+            lamp_is_hidden(&tracer, DVec2::new(p.x, p.z), turned * lamp)
+        };
+        for lamp in [DVec3::new(-3.0, 6.0, 0.0), DVec3::new(-3.0, 4.5, 0.0)] {
+            // The light that passes over the far upper edge falls by 1 m on (3 + half) / (height − 4).
+            let tip = half + POLE_HEIGHT * (half - lamp.x) / (lamp.y - POLE_HEIGHT);
+            if tip < 19.0 {
+                assert!(is_hidden(tip - 1e-11, 0.01, lamp));
+                assert!(!is_hidden(tip + 1e-11, 0.01, lamp));
+            }
+            // Past its sides light passes at the two near edges, x = −half and z = ±half.
+            for x in [0.5, 2.0, 5.0] {
+                let side = half * (x - lamp.x) / (-half - lamp.x);
+                for sign in [-1.0, 1.0] {
+                    assert!(is_hidden(x, sign * (side - 1e-12), lamp), "{quarter} {lamp} {x}");
+                    assert!(!is_hidden(x, sign * (side + 1e-12), lamp), "{quarter} {lamp} {x}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_shadow_of_a_sphere_is_what_lies_in_the_cone_behind_it() {
+    let rings = 200;
+    let scene = builtin("sphere", Some(rings)).unwrap();
+    let tracer = Tracer::new(&scene).unwrap();
+    let sagitta = SPHERE_RADIUS * (std::f64::consts::FRAC_PI_2 / f64::from(rings)).powi(2);
+    let mut random = Random(12);
+    let [mut dark, mut between, mut low] = [0, 0, 0];
+    while dark < 3000 {
+        let lamp = DVec3::new(0.0, 5.0, 0.0) + random.vector(5.0);
+        if lamp.y < 0.05 || lamp.distance(SPHERE_CENTER) < 1.05 * SPHERE_RADIUS {
+            continue;
+        }
+        let half = if random.unit() < 0.5 { 4.0 } else { 19.9 };
+        let at = random.in_square(half);
+        let point = DVec3::new(at.x, 0.0, at.y);
+        // How near the light passes to the sphere's middle.
+        let to_lamp = lamp - point;
+        let along = (SPHERE_CENTER - point).dot(to_lamp) / to_lamp.length_squared();
+        let miss = (point + to_lamp * along.clamp(0.0, 1.0)).distance(SPHERE_CENTER);
+        let is_hidden = lamp_is_hidden(&tracer, at, lamp);
+        assert!(miss <= SPHERE_RADIUS || !is_hidden, "{point} {lamp}");
+        assert!(miss > SPHERE_RADIUS - 1.1 * sagitta || is_hidden, "{point} {lamp}");
+        dark += usize::from(is_hidden);
+        low += usize::from(is_hidden && lamp.y < SPHERE_CENTER.y);
+        between += usize::from((miss - SPHERE_RADIUS).abs() <= 1.1 * sagitta);
+    }
+    assert!(low > 100 && between < 100, "{low} {between}");
 }
 
 #[test]
