@@ -109,10 +109,14 @@ pub(crate) struct Side {
 }
 
 impl Side {
-    /// From the eye along the middle of the face, unit depth: projected perpendicular to the light this
-    /// is the bisector of the face's side edges, whose lengths are alike.
-    pub(crate) fn middle(&self) -> DVec3 {
+    /// From the eye along the middle of the face, unit depth.
+    fn middle(&self) -> DVec3 {
         self.a.midpoint(self.b)
+    }
+
+    /// From the eye along the face's side edges, unit depth.
+    pub(crate) fn edges(&self) -> [DVec3; 2] {
+        [self.a, self.b]
     }
 
     /// What lies farther than `depth` on the face: the half-space through the line there and the light.

@@ -31,39 +31,41 @@ impl LightSpace {
         let (direction, apex) = lamp.direction_and_apex(camera.eye());
         let beam = apex.map_or(direction, |apex| (middle - apex).normalize());
         let sin_theta = beam.cross(camera.forward()).length();
-        Self { sin_theta, ..Self::following(lamp, camera, camera.forward(), middle) }
+        Self { sin_theta, ..Self::following(lamp, camera, [camera.forward(); 2], middle) }
     }
 
-    /// Light space for a side face of the view frustum, with z following the middle of the face. On the face
-    /// pixels grow along z as they do along the view under an overhead light, whatever the light's
-    /// direction.
+    /// Light space for a side face of the view frustum, with z along the bisector of the face's side edges
+    /// (Lloyd et al. 2006, §5.1). On the face pixels grow along z as they do along the view under an
+    /// overhead light, whatever the light's direction.
     pub(crate) fn following_face(lamp: &Lamp, camera: &Camera, side: &Side, middle: DVec3) -> Self {
-        Self::following(lamp, camera, side.middle(), middle)
+        Self::following(lamp, camera, side.edges(), middle)
     }
 
-    /// `along` is of unit depth.
-    fn following(lamp: &Lamp, camera: &Camera, along: DVec3, middle: DVec3) -> Self {
+    /// With z along the bisector of two ways from the eye, of unit depth, as the light sees them.
+    fn following(lamp: &Lamp, camera: &Camera, ways: [DVec3; 2], middle: DVec3) -> Self {
         let (direction, apex) = lamp.direction_and_apex(camera.eye());
-        let (beam, slope) = match apex {
-            None => (direction, along),
-            Some(apex) => {
+        let beam = apex.map_or(direction, |apex| (middle - apex).normalize());
+        let slopes = ways.map(|way| {
+            let slope = apex.map_or(way, |apex| {
                 let r = middle - apex;
                 let depth = direction.dot(r);
                 // Derivative of the light's image of `middle` as it moves along.
-                (r.normalize(), (along - r * (direction.dot(along) / depth)) / depth)
-            }
-        };
-        let z = slope - direction * direction.dot(slope);
-        let z_per_view_metre = z.length();
+                (way - r * (direction.dot(way) / depth)) / depth
+            });
+            // A way exactly along the light has no direction.
+            let is_visible = beam.cross(way).length() > 1e-12;
+            if is_visible { slope - direction * direction.dot(slope) } else { DVec3::ZERO }
+        });
+        let bisector = slopes.map(DVec3::normalize_or_zero).iter().sum::<DVec3>().try_normalize();
+        let z_per_view_metre = bisector.map_or(0.0, |z| slopes[0].midpoint(slopes[1]).dot(z));
         // Looking exactly along the light any z will do. Up in the picture is one that keeps
         // still while the viewer moves.
-        let z =
-            z.try_normalize().filter(|_| beam.cross(along).length() > 1e-12).unwrap_or_else(|| {
-                let up = camera.up();
-                (up - direction * direction.dot(up))
-                    .try_normalize()
-                    .unwrap_or_else(|| direction.any_orthonormal_vector())
-            });
+        let z = bisector.unwrap_or_else(|| {
+            let up = camera.up();
+            (up - direction * direction.dot(up))
+                .try_normalize()
+                .unwrap_or_else(|| direction.any_orthonormal_vector())
+        });
         Self::new(direction, apex, z, 1.0, z_per_view_metre)
     }
 
