@@ -31,8 +31,8 @@ proptest! {
         prop_assume!(camera.eye().length() < 1e3 * camera.near().max(0.1));
         let mut planner = Planner::new();
         let plan = planner.plan(&camera, &[config.light], &config.bounds, &options(warp)).unwrap();
-        let map = &plan.maps[0];
         for p in config.seen_points(&numbers) {
+            let map = &plan.maps[plan.lookup(0, p).next().unwrap().0];
             let shadow = map.project(p).unwrap();
             let row = map.rows.row_from_t(shadow.y);
             let [res_s, res_t] = map.resolution.map(f64::from);
@@ -93,8 +93,8 @@ proptest! {
         prop_assume!(config.camera.eye().length() < 1e3 * config.camera.near().max(0.1));
         let mut planner = Planner::new();
         let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
-        let map = &plan.maps[0];
         for p in config.seen_points(&[number]) {
+            let map = &plan.maps[plan.lookup(0, p).next().unwrap().0];
             let receiver = map.receiver(p, normal).unwrap();
             let Some(q) = meet(map, receiver.st.x + 3e-3, map.rows.row_from_t(receiver.st.y) - 2e-3, p, normal) else {
                 continue;

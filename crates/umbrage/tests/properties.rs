@@ -3,7 +3,6 @@
 mod common;
 
 use common::{WARPS, config, options, partition, possible};
-use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{Aabb, Faces, Light, Objective, Options, Partition, Planner, Warp};
 
@@ -125,7 +124,7 @@ fn maxima_are_reached() {
         config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. }));
     runner
         .run(&suns, |config| {
-            let corners = corners(&config);
+            let corners = config.corners();
             prop_assume!(corners.len() >= 4);
             let mut planner = Planner::new();
             for (name, warp) in WARPS {
@@ -159,30 +158,4 @@ fn maxima_are_reached() {
             Ok(())
         })
         .unwrap();
-}
-
-/// Corners of the body seen, relative to the eye: all intersections of three planes inside the others.
-fn corners(config: &common::Config) -> Vec<DVec3> {
-    let planes = config.half_spaces();
-    let slack = 1e-9 * config.camera.far();
-    let mut corners = Vec::new();
-    for i in 0..planes.len() {
-        for j in 0..i {
-            for k in 0..j {
-                let [a, b, c] = [i, j, k].map(|i| planes[i]);
-                let det = a.normal.dot(b.normal.cross(c.normal));
-                if det.abs() < 1e-9 {
-                    continue;
-                }
-                let p = -(b.normal.cross(c.normal) * a.offset
-                    + c.normal.cross(a.normal) * b.offset
-                    + a.normal.cross(b.normal) * c.offset)
-                    / det;
-                if planes.iter().all(|q| q.distance(p) >= -slack) {
-                    corners.push(p);
-                }
-            }
-        }
-    }
-    corners
 }

@@ -214,6 +214,28 @@ impl Config {
         planes
     }
 
+    /// Corners of the body seen, relative to the eye: all intersections of three planes inside the others.
+    pub(crate) fn corners(&self) -> Vec<DVec3> {
+        let planes = self.half_spaces();
+        let slack = 1e-9 * self.camera.far();
+        let mut corners = Vec::new();
+        for (i, a) in planes.iter().enumerate() {
+            for (j, b) in planes[..i].iter().enumerate() {
+                for c in &planes[..j] {
+                    let det = a.normal.dot(b.normal.cross(c.normal));
+                    let p = -(b.normal.cross(c.normal) * a.offset
+                        + c.normal.cross(a.normal) * b.offset
+                        + a.normal.cross(b.normal) * c.offset)
+                        / det;
+                    if det.abs() > 1e-9 && planes.iter().all(|q| q.distance(p) >= -slack) {
+                        corners.push(p);
+                    }
+                }
+            }
+        }
+        corners
+    }
+
     /// Whether the camera sees `world` in the light, within the bounds.
     pub(crate) fn sees(&self, world: DVec3) -> bool {
         let local = world - self.camera.eye();
