@@ -222,14 +222,20 @@ pub(crate) mod tests {
     #[test]
     fn json_comes_back_to_the_bit() {
         let mut original = report(&[Some(1.0 / 3.0), None, Some(f64::MIN_POSITIVE)]);
-        original.light = LightInfo::Spot {
+        let spot = LightInfo::Spot {
             name: Some("lamp \"1\"".to_owned()),
             position: [1e5, 0.1, -0.3],
             direction: [0.6, -0.8, 0.0],
             half_angle: 30.0,
             range: 12.0,
         };
-        assert_eq!(Report::from_json(&original.to_json().unwrap()).unwrap(), original);
+        let point = LightInfo::Point { name: None, position: [-0.1, 2.5, 1e-9], range: 1.0 / 3.0 };
+        let kind = |light| serde_json::to_value(light).unwrap()["kind"].clone();
+        assert_eq!([kind(&spot), kind(&point)], ["spot", "point"]);
+        for light in [spot, point] {
+            original.light = light;
+            assert_eq!(Report::from_json(&original.to_json().unwrap()).unwrap(), original);
+        }
     }
 
     #[test]

@@ -180,6 +180,26 @@ fn an_empty_folder_is_taken() {
 }
 
 #[test]
+fn a_scene_lit_by_a_point_light_compares() {
+    let desk = Desk::new();
+    let shadows = ["--shadows", "uniform@48x48", "--shadows", "uniform@384x384"];
+    let compare = ["compare", "lantern", "-o", "report", "--json", "--size", "192x108"];
+    let json = desk.json(&[&compare[..], &shadows].concat());
+    assert_eq!(keys(&json["light"]), ["kind", "name", "position", "range"]);
+    assert_eq!(
+        (&json["light"]["kind"], &json["light"]["name"]),
+        (&"point".into(), &"flame".into())
+    );
+    let wrong = [0, 1].map(|i| {
+        assert_eq!(json["results"][i]["maps"], 6);
+        json["results"][i]["wrong_fraction"].as_f64().unwrap()
+    });
+    assert!(wrong[0] < 0.2 && wrong[1] < 0.03 && wrong[1] < 0.4 * wrong[0], "{wrong:?}");
+    let page = std::fs::read_to_string(desk.path("report/index.html")).unwrap();
+    assert!(page.contains("“flame”, point at (0, 2.35, 0) m"));
+}
+
+#[test]
 fn real_scenes_compare() {
     // Of each kind one: cards with holes, instances, a room, a city, thirty kilometres of land.
     for scene in [

@@ -122,6 +122,46 @@ fn a_scene_tightens_the_plan() {
 }
 
 #[test]
+fn a_point_light_gets_a_map_for_each_side_of_a_cube() {
+    let desk = Desk::new();
+    desk.write("stage.gltf", STAGE_GLTF);
+    let view = "plan stage.gltf --light bulb --eye 0,4,15 --target 0,0,0 --shadows uniform@32x32";
+    let plan = desk.json(&[&view.split(' ').collect::<Vec<_>>()[..], &["--json"]].concat());
+    let maps = plan["maps"].as_array().unwrap();
+    assert_eq!(maps.len(), 6);
+    // The bulb hangs at (0, 3, 0); ground below it, before and behind it, and to its sides.
+    let bulb = DVec3::Y * 3.0;
+    let mut servants = Vec::new();
+    for ground in [
+        DVec3::new(0.5, 0.0, -1.0),
+        DVec3::new(0.2, 0.0, 4.0),
+        DVec3::new(-0.2, 0.0, -6.0),
+        DVec3::new(4.0, 0.0, 1.0),
+        DVec3::new(-4.0, 0.0, 1.0),
+    ] {
+        let serves = |map: &&Value| {
+            let h = matrix(map) * ground.extend(1.0);
+            let p = h.xyz() / h.w;
+            h.w > 0.0 && p.cmpge(DVec3::splat(0.0)).all() && p.cmple(DVec3::splat(1.0)).all()
+        };
+        let of: Vec<usize> = (0..6).filter(|&i| serves(&&maps[i])).collect();
+        let [map] = of[..] else { panic!("{ground} is in the maps {of:?}") };
+        servants.push(map);
+        // What lies between falls on the same texel, nearer the light.
+        let project = |p: DVec3| {
+            let h = matrix(&maps[map]) * p.extend(1.0);
+            h.xyz() / h.w
+        };
+        let (receiver, caster) = (project(ground), project(ground.lerp(bulb, 0.6)));
+        assert!((caster - receiver).truncate().length() < 1e-9, "{receiver} {caster}");
+        assert!(caster.z < receiver.z, "{receiver} {caster}");
+    }
+    servants.sort_unstable();
+    servants.dedup();
+    assert_eq!(servants.len(), 5, "{servants:?}");
+}
+
+#[test]
 fn parts_of_a_view_can_be_replaced() {
     let desk = Desk::new();
     let split = |options: &[&str]| -> [f64; 2] {

@@ -66,6 +66,34 @@ fn visibility_is_white_in_light_and_black_in_shadow() {
 }
 
 #[test]
+fn a_point_light_shines_on_a_disc() {
+    // A bulb 3 m above the ground that reaches 5 m, seen from 8 m above: it lights a disc of 4 m.
+    let desk = Desk::new();
+    let bulb = r#""bulb", "intensity": 500"#;
+    assert!(STAGE_GLTF.contains(bulb));
+    desk.write("stage.gltf", &STAGE_GLTF.replace(bulb, &format!(r#"{bulb}, "range": 5"#)));
+    let view = "render stage.gltf --light bulb --eye 0,8,0 --target 0,0,0 --up 0,0,-1 --fov 60 \
+                --size 48x48 --samples 1 --shadows uniform@256 -o v.png";
+    let mut counts = [0; 2];
+    for aov in ["truth", "visibility"] {
+        let words = format!("{view} --aov {aov}");
+        desk.succeed(&words.split_whitespace().collect::<Vec<_>>());
+        let picture = image::open(desk.path("v.png")).unwrap().to_luma8();
+        for (column, row, pixel) in picture.enumerate_pixels() {
+            let meters = 16.0 * 30f64.to_radians().tan() / 48.0;
+            let [x, z] = [column, row].map(|i| (f64::from(i) + 0.5 - 24.0) * meters);
+            // The triangle is 8 m wide to both sides at z = 8 and ends in a point at z = −8.
+            if x.abs() < (z + 8.0) / 2.0 - 0.1 {
+                let is_lit = x.hypot(z) < 4.0;
+                assert_eq!(pixel.0, [if is_lit { 255 } else { 0 }], "{aov} at {x}, {z}");
+                counts[usize::from(is_lit)] += 1;
+            }
+        }
+    }
+    assert!(counts[0] > 500 && counts[1] > 2000, "{counts:?}");
+}
+
+#[test]
 fn masks_are_ignored_only_if_told() {
     let desk = Desk::new();
     let house = crate::desk::shared_scene("house/house.glb");

@@ -361,6 +361,32 @@ mod tests {
     }
 
     #[test]
+    fn setup_tells_where_light_comes_from() {
+        let mut report = report(&[Some(0.5)]);
+        let mut say = |light: LightInfo| {
+            report.light = light;
+            let lines = setup(&report).into_iter().map(|(what, how)| format!("{what}: {how}"));
+            let lines: Vec<String> = lines
+                .skip_while(|l| !l.starts_with("Light"))
+                .take_while(|l| !l.starts_with("Truth"))
+                .collect();
+            lines.join("; ")
+        };
+        let name = Some("flame".to_owned());
+        let (position, direction) = ([0.0, 2.35, -1.0], [0.0, -1.0, 0.0]);
+        let sun = LightInfo::Directional { name: None, direction };
+        assert_eq!(say(sun), "Light: directional, travels (0, −1, 0)");
+        let point = LightInfo::Point { name: name.clone(), position, range: 12.5 };
+        assert_eq!(say(point), "Light: “flame”, point at (0, 2.35, −1) m; reaches: 12.5 m");
+        let spot = LightInfo::Spot { name, position, direction, half_angle: 30.0, range: 12.5 };
+        assert_eq!(
+            say(spot),
+            "Light: “flame”, spot at (0, 2.35, −1) m; shines: (0, −1, 0), 30° to each side; \
+             reaches: 12.5 m"
+        );
+    }
+
+    #[test]
     fn data_cannot_leave_its_element() {
         let mut report = report(&[Some(0.5)]);
         report.results[0].shadows = "</script><!--".to_owned();
