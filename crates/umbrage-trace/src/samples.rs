@@ -115,6 +115,28 @@ impl<'a> View<'a> {
         Some(Sample { surface, depth: hit.t, is_facing })
     }
 
+    /// A point that another view saw, as this one sees it: `None` if it is outside the picture, nearer
+    /// than the camera's near distance, hidden, or turned away.
+    pub fn sees(&self, surface: &Surface) -> Option<Sample> {
+        let to_eye = self.camera.eye() - surface.position;
+        let depth = self.camera.depth(surface.position);
+        let pixel = self.camera.pixel(surface.position)?;
+        let size = glam::UVec2::from(self.camera.image()).as_dvec2();
+        let is_inside = pixel.cmpge(DVec2::ZERO).all() && pixel.cmple(size).all();
+        let is_towards = surface.geometric_normal.dot(to_eye) > 0.0;
+        // What is nearer to the eye than the near distance hides nothing.
+        let end = 1.0 - self.camera.near() / depth;
+        let is_seen = is_inside
+            && is_towards
+            && end >= 0.0
+            && !self.tracer.occluded_from(surface, to_eye, end);
+        is_seen.then(|| Sample {
+            surface: *surface,
+            depth,
+            is_facing: is_facing(&self.light, surface.position, surface.geometric_normal),
+        })
+    }
+
     /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
     ///
     /// All that lies before a lamp casts, its own housing too; what is nearer to it than `near` gets no
