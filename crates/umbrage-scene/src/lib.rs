@@ -13,7 +13,7 @@ mod view;
 
 pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;
-pub use load::load;
+pub use load::{files, load};
 pub use types::{
     Alpha, Instance, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture, TextureId,
     Wrap,

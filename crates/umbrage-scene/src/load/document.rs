@@ -5,7 +5,7 @@ use gltf::json::{Index, Root, root::Get};
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A scene file's JSON and the bytes it refers to.
 ///
@@ -109,16 +109,25 @@ impl<'a> Document<'a> {
         Ok(buffers)
     }
 
+    /// The files that this one refers to, of those that there are.
+    pub(super) fn referred_files(&self) -> Vec<PathBuf> {
+        let buffers = self.root.buffers.iter().filter_map(|b| b.uri.as_ref());
+        let images = self.root.images.iter().filter_map(|i| i.uri.as_ref());
+        let uris = buffers.chain(images).filter(|uri| !uri.starts_with("data:"));
+        uris.filter_map(|uri| uri::file_below(self.folder(), uri).ok()).collect()
+    }
+
+    fn folder(&self) -> &'a Path {
+        self.path.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."))
+    }
+
     /// What a URI of the file refers to.
     pub(super) fn fetch(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
         if let Some(data) = uri.strip_prefix("data:") {
             return uri::decode_data(data).map_err(|problem| self.invalid(place, problem));
         }
-        let folder = match self.path.parent() {
-            Some(p) if p != Path::new("") => p,
-            _ => Path::new("."),
-        };
-        let file = uri::file_below(folder, uri).map_err(|problem| self.invalid(place, problem))?;
+        let file =
+            uri::file_below(self.folder(), uri).map_err(|problem| self.invalid(place, problem))?;
         read_file(&file)
     }
 

@@ -17,7 +17,7 @@ use gltf::json::{Index, Node};
 use hierarchy::{Hierarchy, LARGEST};
 use material::Materials;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use umbrage::Aabb;
 
 /// Positions in the world end here, metres: those of the planner do.
@@ -64,6 +64,18 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         loader.load_onlooker(node, bounds)?;
     }
     Ok(loader.finish())
+}
+
+/// The files that [`load`] reads for a scene: its own first, then those that it refers to, in a fixed
+/// order. What cannot be found is left out.
+///
+/// # Errors
+/// A file that cannot be read or is not glTF 2.0.
+pub fn files(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let bytes = document::read_file(path)?;
+    let mut files = vec![path.to_owned()];
+    files.extend(Document::parse(path, &bytes)?.referred_files());
+    Ok(files)
 }
 
 struct Loader<'a> {
