@@ -71,6 +71,9 @@ pub enum Error {
         /// Why, in the encoder's words.
         reason: String,
     },
+    /// A table could not be put into text.
+    #[error("cannot write a table: {0}")]
+    Table(#[from] csv::Error),
     /// Text that is no `report.json`.
     #[error("not a report: {0}")]
     Json(#[from] serde_json::Error),

@@ -22,6 +22,7 @@ mod metrics;
 mod page;
 mod pictures;
 mod report;
+mod sweep;
 
 pub use color::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS};
 pub use error::Error;
@@ -29,6 +30,7 @@ pub use files::{ExrPixel, PngPixel, write_exr, write_file, write_png};
 pub use image::{Image, Rgb};
 pub use maps::{difference_map, error_map, grey, partition_map, texel_map};
 pub use metrics::{ErrorPx, Metrics, measure, measure_error_px, worst_spot};
-pub use page::{Page, write_report};
+pub use page::{Page, SweepPage, write_report, write_sweep};
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
 pub use report::{LightInfo, Measured, Report, Times, Truth, View};
+pub use sweep::{Mean, Sweep, SweepSettings, SweptView};

@@ -6,6 +6,9 @@ use crate::{
 };
 use std::path::Path;
 
+/// The file of the truth's shaded picture.
+pub(crate) const TRUTH_COLOR: &str = "truth-color.png";
+
 /// What was seen with one technique, all of the same size.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
@@ -63,7 +66,7 @@ pub fn write_truth_pictures(
     truth.color.check_like(truth.visibility, "picture")?;
     let folder = folder.as_ref();
     let pictures = Pictures {
-        color: "truth-color.png".to_owned(),
+        color: TRUTH_COLOR.to_owned(),
         visibility: "truth-visibility.png".to_owned(),
         ..Pictures::default()
     };

@@ -1,7 +1,8 @@
-//! The HTML report.
+//! The HTML pages: a report's, a sweep's.
 
 mod chart;
 mod numbers;
+mod sweep;
 mod table;
 mod techniques;
 mod view;
@@ -9,6 +10,7 @@ mod view;
 use crate::{Error, ErrorScale, Pictures, Report, write_file};
 use askama::Template;
 use std::path::Path;
+pub use sweep::{SweepPage, write_sweep};
 
 /// A report with its pictures, ready to be shown.
 #[derive(Clone, Copy, Debug)]

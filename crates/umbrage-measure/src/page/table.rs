@@ -1,7 +1,7 @@
 //! The table of figures.
 
 use super::numbers::{UNKNOWN, count, percent, significant};
-use crate::{Measured, Report};
+use crate::Measured;
 
 /// A column: what it shows of a result, and how.
 pub(super) struct Column {
@@ -42,8 +42,8 @@ const fn column(
     }
 }
 
-/// The columns that have something to show in this report.
-pub(super) fn columns(report: &Report) -> Vec<Column> {
+/// The columns that have something to show of these results.
+pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
     // Times differ by more than techniques do from one run to the next: no laurels for these.
     let time = |c: Column| Column { smaller_is_better: false, always: false, ..c };
     let whole = |c: Column| Column { smaller_is_better: false, text: |v| count(v as u64), ..c };
@@ -87,28 +87,42 @@ pub(super) fn columns(report: &Report) -> Vec<Column> {
         time(column("Shade", "ms", "Time to look the maps up for the picture", |r| r.ms.shade)),
         time(column("Total", "ms", "Time of all stages together", |r| r.ms.total())),
     ];
-    let has_figures =
-        |c: &Column| c.always || report.results.iter().any(|r| (c.value)(r).is_some());
+    let has_figures = |c: &Column| c.always || results.iter().any(|r| (c.value)(r).is_some());
     columns.into_iter().filter(has_figures).collect()
+}
+
+/// The results' rows of cells, which compete within their columns.
+pub(super) fn rows(columns: &[Column], results: &[Measured]) -> Vec<Vec<Cell>> {
+    let mut rows: Vec<Vec<Cell>> = results.iter().map(|_| Vec::new()).collect();
+    for column in columns {
+        for (row, cell) in rows.iter_mut().zip(column.cells(results)) {
+            row.push(cell);
+        }
+    }
+    rows
 }
 
 impl Column {
     /// The cells of this column, in the results' order.
-    pub(super) fn cells(&self, report: &Report) -> Vec<Cell> {
-        let values: Vec<Option<f64>> =
-            report.results.iter().map(|r| (self.value)(r).filter(|v| v.is_finite())).collect();
-        let known = || values.iter().flatten().copied();
-        let smallest = known().fold(f64::INFINITY, f64::min);
-        let largest = known().fold(f64::NEG_INFINITY, f64::max);
-        let ranked = self.smaller_is_better && smallest < largest;
-        values
-            .iter()
-            .map(|value| match *value {
-                Some(v) => {
-                    Cell { text: (self.text)(v), key: v.to_string(), best: ranked && v == smallest }
-                }
-                None => Cell { text: UNKNOWN.to_owned(), key: String::new(), best: false },
-            })
-            .collect()
+    pub(super) fn cells(&self, results: &[Measured]) -> Vec<Cell> {
+        let values: Vec<_> = results.iter().map(self.value).collect();
+        cells(&values, self.text, self.smaller_is_better)
     }
+}
+
+/// Cells of figures that compete with one another.
+pub(super) fn cells(
+    values: &[Option<f64>],
+    text: fn(f64) -> String,
+    smaller_is_better: bool,
+) -> Vec<Cell> {
+    let known = || values.iter().flatten().copied().filter(|v| v.is_finite());
+    let smallest = known().fold(f64::INFINITY, f64::min);
+    let largest = known().fold(f64::NEG_INFINITY, f64::max);
+    let ranked = smaller_is_better && smallest < largest;
+    let cell = |value: &Option<f64>| match value.filter(|v| v.is_finite()) {
+        Some(v) => Cell { text: text(v), key: v.to_string(), best: ranked && v == smallest },
+        None => Cell { text: UNKNOWN.to_owned(), key: String::new(), best: false },
+    };
+    values.iter().map(cell).collect()
 }

@@ -42,9 +42,9 @@ pub(super) struct Html<'a> {
 }
 
 /// The outcome in a sentence: emphasised name, then the rest.
-struct Finding {
-    name: String,
-    rest: String,
+pub(super) struct Finding {
+    pub(super) name: String,
+    pub(super) rest: String,
 }
 
 /// A kind of picture to look at.
@@ -87,13 +87,8 @@ impl Pictures {
 impl<'a> Html<'a> {
     pub(super) fn new(page: &Page<'a>) -> Result<Self, Error> {
         let Page { report, truth, pictures, scale, notices, command } = *page;
-        let columns = table::columns(report);
-        let mut rows: Vec<Vec<Cell>> = report.results.iter().map(|_| Vec::new()).collect();
-        for column in &columns {
-            for (row, cell) in rows.iter_mut().zip(column.cells(report)) {
-                row.push(cell);
-            }
-        }
+        let columns = table::columns(&report.results.iter().collect::<Vec<_>>());
+        let rows = table::rows(&columns, &report.results);
         let best = best(report);
         let results: Vec<Shown<'a>> = report
             .results
@@ -120,16 +115,19 @@ impl<'a> Html<'a> {
             .collect();
         let kinds = kinds(pictures);
         let [w, h] = report.size;
-        let n = results.len();
+        let n = results.len() as u64;
         Ok(Self {
             css: include_str!("../../assets/report.css"),
-            js: include_str!("../../assets/report.js"),
+            js: concat!(
+                include_str!("../../assets/report.js"),
+                include_str!("../../assets/table.js")
+            ),
             data: data(page, &kinds)?,
             version: env!("CARGO_PKG_VERSION"),
             scene: &report.scene,
             size: report.size,
             small: w < 480,
-            facts: format!("{w} × {h} pixels · {n} technique{}", if n == 1 { "" } else { "s" }),
+            facts: format!("{w} × {h} pixels · {}", plural(n, "technique")),
             finding: finding(report, best),
             kinds,
             truth,
@@ -142,7 +140,7 @@ impl<'a> Html<'a> {
             counted: counted(report),
             undefined: report.results.iter().any(|r| r.error_px.undefined > 0),
             setup: setup(report),
-            techniques: techniques(report),
+            techniques: techniques(report.results.iter().map(|r| r.shadows.as_str())),
             notices,
             command,
         })
@@ -199,14 +197,23 @@ fn counted(report: &Report) -> String {
 }
 
 fn truth_how(report: &Report) -> String {
-    let rays = match report.truth.rays_per_pixel {
-        1 => "one ray a pixel".to_owned(),
-        n => format!("{n} rays a pixel"),
-    };
+    let rays = rays_a_pixel(report.truth.rays_per_pixel);
     match report.truth.seconds {
         Some(s) => format!("{rays}, in {}", duration_ms(s * 1e3)),
         None => rays,
     }
+}
+
+pub(super) fn rays_a_pixel(n: u32) -> String {
+    match n {
+        1 => "one ray a pixel".to_owned(),
+        n => format!("{n} rays a pixel"),
+    }
+}
+
+/// A count of things: `1 view`, `1 200 views`.
+pub(super) fn plural(n: u64, thing: &str) -> String {
+    format!("{} {thing}{}", count(n), if n == 1 { "" } else { "s" })
 }
 
 fn label(kind: &str) -> &'static str {
@@ -279,14 +286,17 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
     setup
 }
 
-fn techniques(report: &Report) -> Vec<(String, &'static str)> {
+/// The warps of these specifications, each with a sentence.
+pub(super) fn techniques<'a>(
+    specifications: impl Iterator<Item = &'a str>,
+) -> Vec<(String, &'static str)> {
     let mut techniques: Vec<(String, &'static str)> = Vec::new();
-    for r in &report.results {
-        let Some(text) = description(&r.shadows) else {
+    for shadows in specifications {
+        let Some(text) = description(shadows) else {
             continue;
         };
         if techniques.iter().all(|(_, known)| *known != text) {
-            let name = r.shadows.split(['+', ':', '@']).next().unwrap_or_default();
+            let name = shadows.split(['+', ':', '@']).next().unwrap_or_default();
             techniques.push((name.to_owned(), text));
         }
     }
@@ -324,7 +334,7 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
 }
 
 /// A file name as a relative URL.
-fn url(file: &str) -> String {
+pub(super) fn url(file: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
     let escape = |b: u8| {
         if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }

@@ -7,7 +7,7 @@ use chromium::Browser;
 use demo::{Compared, flat, spheres_on_a_plane};
 use serde_json::json;
 use std::path::PathBuf;
-use umbrage_measure::{Report, Rgb};
+use umbrage_measure::{Report, Rgb, Sweep, SweepPage, SweepSettings, SweptView, write_sweep};
 
 const RED: Rgb = [220, 30, 20];
 const GREEN: Rgb = [20, 160, 60];
@@ -343,5 +343,71 @@ fn works_without_scripts_and_on_paper() {
     browser.call("Emulation.setEmulatedMedia", json!({"media": "print"}));
     assert_eq!(shown(&mut browser, "#compare, nav, .worst"), 0, "nothing to click on paper");
     assert_eq!(shown(&mut browser, "#table tbody tr"), n);
+    check_quiet(&browser);
+}
+
+#[test]
+fn a_sweeps_page_leads_to_its_views() {
+    let nasty = "<img src=x onerror=owned=1>'\"&<!--";
+    let names = ["uniform", "lispsm:pcf3@64"];
+    let mut other = flat([64, 48], BLUE, &[(names[0], GREEN), (names[1], RED)]);
+    other.scene = nasty.to_owned();
+    let mut spheres = spheres_on_a_plane([160, 90], 2);
+    spheres.results.iter_mut().zip(names).for_each(|(r, name)| r.name = name.to_owned());
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("reports/sweep");
+    let view = |name: &str, compared: Option<&Compared>| SweptView {
+        name: name.to_owned(),
+        scene: nasty.to_owned(),
+        folder: format!("views/{name}"),
+        outcome: compared
+            .map(|c| report(&format!("sweep/views/{name}"), c).1.without_times())
+            .ok_or_else(|| nasty.to_owned()),
+    };
+    let sweep = Sweep {
+        name: nasty.to_owned(),
+        share: None,
+        settings: SweepSettings {
+            shadows: names.map(str::to_owned).to_vec(),
+            size: [160, 90],
+            samples: 4,
+            opaque: true,
+            backend: "reference".to_owned(),
+        },
+        views: vec![
+            view("spheres", Some(&spheres)),
+            view("broken", None),
+            view("a flat (one)", Some(&other)),
+        ],
+    };
+    write_sweep(&folder, &SweepPage { sweep: &sweep, command: Some(nasty) }).unwrap();
+    let index = folder.join("index.html");
+    let mut browser = Browser::start();
+    for (window, mobile) in [([360, 740], true), ([1280, 800], false)] {
+        browser.open(&index, window, mobile);
+        browser.wait_for("[...document.images].every(i => i.complete && i.naturalWidth > 0)");
+        check_fits(&mut browser, &format!("sweep at {window:?}"));
+    }
+    assert_eq!(browser.eval("document.querySelector('h1').textContent"), json!(nasty));
+    assert_eq!(browser.eval("typeof owned"), json!("undefined"));
+    assert_eq!(browser.eval("document.querySelectorAll('#means tbody tr').length"), json!(2));
+    assert_eq!(browser.eval("document.querySelectorAll('#views td.failed').length"), json!(1));
+
+    let column = |browser: &mut Browser, i: u32| {
+        browser.eval(&format!(
+            "[...document.querySelectorAll('#table tbody tr')].map(r => r.cells[{i}].dataset.key)"
+        ))
+    };
+    let [flat, spheres] = ["a flat (one)", "spheres"];
+    assert_eq!(column(&mut browser, 0), json!([spheres, spheres, flat, flat]));
+    browser.click("#table thead th:nth-child(1) button");
+    assert_eq!(column(&mut browser, 0), json!([flat, flat, spheres, spheres]));
+    browser.click("#table thead th:nth-child(2) button");
+    assert_eq!(column(&mut browser, 1), json!([names[1], names[1], names[0], names[0]]));
+
+    browser.click("#views tbody tr:last-child a");
+    browser.wait_for(
+        "decodeURIComponent(location.pathname).endsWith('/views/a flat (one)/index.html') && \
+         document.querySelector('#stage') !== null",
+    );
     check_quiet(&browser);
 }

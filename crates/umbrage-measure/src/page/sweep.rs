@@ -1,0 +1,269 @@
+//! What the template of a sweep's page shows, put into words.
+
+use super::numbers::{percent, significant};
+use super::table::{self, Cell, Column};
+use super::view::{Finding, plural, rays_a_pixel, techniques, url};
+use crate::pictures::TRUTH_COLOR;
+use crate::{Error, Mean, Measured, Sweep, SweptView, write_file};
+use askama::Template;
+use std::path::Path;
+
+/// A sweep, ready to be shown.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepPage<'a> {
+    /// The figures.
+    pub sweep: &'a Sweep,
+    /// The command line that makes this page again, if there is one.
+    pub command: Option<&'a str>,
+}
+
+/// Writes `results.csv`, `results.json` and then `index.html` into `folder`, which must exist and hold the
+/// views' reports. The page opens offline.
+///
+/// # Errors
+/// If there are no specifications, a view's results are not those of the sweep's specifications, its
+/// report is missing in `folder`, or the files cannot be written.
+pub fn write_sweep(folder: impl AsRef<Path>, page: &SweepPage<'_>) -> Result<(), Error> {
+    let folder = folder.as_ref();
+    let sweep = page.sweep;
+    sweep.check()?;
+    for (view, _) in sweep.reports() {
+        let file = view.file("index.html");
+        if !folder.join(&file).is_file() {
+            let problem = format!("{file} is not in {}", folder.display());
+            return Err(Error::Report { field: "views", problem });
+        }
+    }
+    let path = folder.join("index.html");
+    let means = sweep.means();
+    let html = Html::new(page, &means)
+        .render()
+        .map_err(|e| Error::Encode { path: path.clone(), reason: e.to_string() })?;
+    write_file(folder.join("results.csv"), sweep.to_csv()?.as_bytes())?;
+    write_file(folder.join("results.json"), sweep.to_json()?.as_bytes())?;
+    write_file(path, html.as_bytes())
+}
+
+/// The page. User text goes through askama's escaping; what is marked `safe` in the template is this
+/// crate's own.
+#[derive(Template)]
+#[template(path = "sweep.html")]
+struct Html<'a> {
+    css: &'static str,
+    js: &'static str,
+    version: &'static str,
+    name: &'a str,
+    facts: String,
+    finding: Finding,
+    means: Vec<ShownMean<'a>>,
+    means_over: String,
+    any_raised: bool,
+    views: Vec<Shown<'a>>,
+    columns: Vec<Column>,
+    undefined: bool,
+    techniques: Vec<(String, &'static str)>,
+    setup: Vec<(&'static str, String)>,
+    command: Option<&'a str>,
+}
+
+struct ShownMean<'a> {
+    mean: &'a Mean,
+    wrong: Cell,
+    error: Cell,
+}
+
+/// One view.
+struct Shown<'a> {
+    view: &'a SweptView,
+    page: String,
+    thumbnail: String,
+    /// One a technique.
+    wrong: Vec<Cell>,
+    rows: Vec<Row<'a>>,
+}
+
+/// One technique in one view.
+struct Row<'a> {
+    shadows: &'a str,
+    cells: Vec<Cell>,
+}
+
+impl<'a> Html<'a> {
+    fn new(page: &SweepPage<'a>, means: &'a [Mean]) -> Self {
+        let SweepPage { sweep, command } = *page;
+        let results: Vec<&Measured> = sweep.reports().flat_map(|(_, r)| &r.results).collect();
+        let columns = table::columns(&results);
+        let settings = &sweep.settings;
+        let wrong = means.iter().map(|m| m.wrong_fraction).collect::<Vec<_>>();
+        let error = means.iter().map(|m| m.mean_abs_error).collect::<Vec<_>>();
+        let cells = table::cells(&wrong, percent, true).into_iter().zip(table::cells(
+            &error,
+            significant,
+            true,
+        ));
+        let shadows = settings.shadows.iter().map(String::as_str);
+        Self {
+            css: include_str!("../../assets/report.css"),
+            js: include_str!("../../assets/table.js"),
+            version: env!("CARGO_PKG_VERSION"),
+            name: &sweep.name,
+            facts: facts(sweep),
+            finding: finding(sweep, means),
+            means: means
+                .iter()
+                .zip(cells)
+                .map(|(mean, (wrong, error))| ShownMean { mean, wrong, error })
+                .collect(),
+            means_over: means_over(sweep, means),
+            any_raised: means.iter().any(|m| m.wrong_fraction_raised + m.mean_abs_error_raised > 0),
+            views: sweep.views.iter().map(|v| Shown::new(v, &columns)).collect(),
+            undefined: results.iter().any(|r| r.error_px.undefined > 0),
+            columns,
+            techniques: techniques(shadows),
+            setup: setup(sweep),
+            command,
+        }
+    }
+}
+
+impl<'a> Shown<'a> {
+    fn new(view: &'a SweptView, columns: &[Column]) -> Self {
+        let results: &[Measured] = view.outcome.as_ref().map_or(&[], |report| &report.results);
+        let wrong: Vec<_> = results.iter().map(|r| r.metrics.wrong_fraction).collect();
+        Self {
+            view,
+            page: view.file("index.html"),
+            thumbnail: view.file(TRUTH_COLOR),
+            wrong: table::cells(&wrong, percent, true),
+            rows: results
+                .iter()
+                .zip(table::rows(columns, results))
+                .map(|(r, cells)| Row { shadows: &r.shadows, cells })
+                .collect(),
+        }
+    }
+}
+
+fn facts(sweep: &Sweep) -> String {
+    let mut facts = vec![
+        plural(sweep.views.len() as u64, "view"),
+        plural(sweep.settings.shadows.len() as u64, "technique"),
+    ];
+    let failed = sweep.errors().count();
+    if failed > 0 {
+        facts.push(format!("{failed} failed"));
+    }
+    if let Some(share) = &sweep.share {
+        facts.push(format!("share {share}"));
+    }
+    facts.join(" · ")
+}
+
+fn finding(sweep: &Sweep, means: &[Mean]) -> Finding {
+    let known = |m: &'_ &Mean| Some((m.wrong_fraction?, m.shadows.clone()));
+    let mut ranked: Vec<(f64, String)> = means.iter().filter_map(|m| known(&m)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let say = |name: &str, rest: String| Finding { name: name.to_owned(), rest };
+    match &ranked[..] {
+        [] if sweep.views.is_empty() => say("", "This share has no views.".to_owned()),
+        [] => say("", "No view shows anything to measure.".to_owned()),
+        [(wrong, name)] => say(
+            name,
+            format!("shows {} % of the counted pixels wrong in the mean.", percent(*wrong)),
+        ),
+        [(least, best), .., (most, _)] if least == most => say(
+            best,
+            format!(
+                "shows {} % of the counted pixels wrong in the mean, as do all the others.",
+                percent(*least)
+            ),
+        ),
+        [(least, best), .., (most, worst)] => say(
+            best,
+            format!(
+                "comes closest to the truth: in the mean {} % of the counted pixels are wrong. {worst} \
+                 gets {} times as many.",
+                percent(*least),
+                significant(most / least)
+            ),
+        ),
+    }
+}
+
+/// What the means are over.
+fn means_over(sweep: &Sweep, means: &[Mean]) -> String {
+    let views = means.first().map_or(0, |m| m.views);
+    let done = sweep.reports().count();
+    let mut text = format!("Over {}", plural(views as u64, "view"));
+    if views < done {
+        text +=
+            &format!("; in {} no surface faces the light, so nothing was counted", done - views);
+    }
+    let failed = sweep.errors().count();
+    if failed > 0 {
+        text += &format!("; {failed} failed, left out here");
+    }
+    text + "."
+}
+
+fn setup(sweep: &Sweep) -> Vec<(&'static str, String)> {
+    let settings = &sweep.settings;
+    let [w, h] = settings.size;
+    let mut setup = vec![
+        ("Pictures", format!("{w} × {h} pixels, where a view has no size of its own")),
+        ("Truth", rays_a_pixel(settings.samples.pow(2))),
+        ("Executed by", settings.backend.clone()),
+    ];
+    if settings.opaque {
+        setup.push(("Alpha masks", "ignored: masked materials show and cast as solid".to_owned()));
+    }
+    setup
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::tests::sweep;
+
+    #[test]
+    fn finding_compares_means() {
+        let say = |views: &[Option<&[Option<f64>]>]| {
+            let sweep = sweep(views);
+            let finding = finding(&sweep, &sweep.means());
+            format!("{} {}", finding.name, finding.rest)
+        };
+        assert_eq!(
+            say(&[Some(&[Some(0.2), Some(0.02)]), Some(&[Some(0.2), Some(0.08)])]),
+            "lambda=1@1024 comes closest to the truth: in the mean 4.00 % of the counted pixels are \
+             wrong. lambda=0@1024 gets 5.00 times as many."
+        );
+        assert!(say(&[Some(&[Some(0.5)])]).contains("lambda=0@1024 shows 50.0 %"));
+        assert!(say(&[Some(&[Some(0.5), Some(0.5)])]).ends_with(", as do all the others."));
+        assert!(say(&[Some(&[None]), None]).contains("No view shows anything to measure"));
+        assert!(say(&[]).contains("no views"));
+    }
+
+    #[test]
+    fn what_is_left_out_is_said() {
+        let say = |views: &[Option<&[Option<f64>]>]| {
+            let sweep = sweep(views);
+            means_over(&sweep, &sweep.means())
+        };
+        assert_eq!(say(&[Some(&[Some(0.5)])]), "Over 1 view.");
+        assert_eq!(
+            say(&[Some(&[Some(0.5)]), Some(&[None]), None]),
+            "Over 1 view; in 1 no surface faces the light, so nothing was counted; 1 failed, left out \
+             here."
+        );
+    }
+
+    #[test]
+    fn pages_of_missing_reports_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let sweep = sweep(&[Some(&[Some(0.5)])]);
+        let page = SweepPage { sweep: &sweep, command: None };
+        let error = write_sweep(folder.path(), &page).unwrap_err().to_string();
+        assert!(error.starts_with("views: views/view 0/index.html is not in "), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
