@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Render(Render),
     /// Compare techniques with ray-traced truth, in a report that opens offline.
     Compare(Compare),
+    /// Compare techniques in many views, with means over all.
+    Sweep(Sweep),
     /// Print the matrices, resolutions and errors that an engine needs.
     Plan(Plan),
     /// List the built-in scenes.
@@ -109,18 +111,8 @@ pub(crate) struct Compare {
     /// Folder for the report; a former report there is replaced.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
-    #[arg(long_help = SHADOWS_HELP,
-        long, value_name = "SPEC",
-        default_values = DEFAULT_TECHNIQUES
-    )]
-    pub(crate) shadows: Vec<Technique>,
-    /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
-    /// comparisons use 1.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
-    pub(crate) samples: u32,
     #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
+    pub(crate) comparison: ComparisonArgs,
     /// Print report.json to standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -128,6 +120,62 @@ pub(crate) struct Compare {
     pub(crate) view: ViewArgs,
     #[command(flatten)]
     pub(crate) light: LightArgs,
+}
+
+/// `umbrage sweep`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+VIEWS is a JSON list of objects. Each needs `name` and `scene`; what `compare` takes as options may
+follow, with the same defaults: `eye`, `target`, `up` (three numbers), `fov`, `near`, `far`, `size` (two),
+`camera`, `sun` (three) and `light`. For example
+  [{\"name\": \"noon\", \"scene\": \"town\", \"sun\": [0.1, -1, 0.2]},
+   {\"name\": \"gate\", \"scene\": \"city/level.glb\", \"eye\": [0, 2, 9], \"target\": [0, 1, 0], \"far\": 80}]
+A sweep that was stopped goes on where it was if the same command is given again. What failed is tried
+again.
+
+Examples:
+  umbrage sweep views.json -o sweep --shadows uniform --shadows lispsm:pcf3@2048
+  umbrage sweep views.json -o share2 --shard 2/8
+  umbrage sweep views.json -o sweep --merge share1 share2 share3 share4 share5 share6 share7 share8")]
+pub(crate) struct Sweep {
+    /// A JSON list of views (the end of this help shows one).
+    #[arg(value_name = "VIEWS")]
+    pub(crate) views: PathBuf,
+    /// Folder for the results; a sweep that was begun there goes on.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Folder that the scenes' paths start from; without it, the folder of VIEWS.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) scenes: Option<PathBuf>,
+    /// Do the I-th of N equal shares of the views, in their order, into a folder of its own.
+    #[arg(long, value_name = "I/N", value_parser = values::share)]
+    pub(crate) shard: Option<Share>,
+    /// Take what there is from these folders of other shares of this sweep, and compute nothing.
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    pub(crate) merge: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) comparison: ComparisonArgs,
+    /// Alpha-masked materials cast and show as solid.
+    #[arg(long)]
+    pub(crate) opaque: bool,
+    /// Size of the pictures, pixels, where a view has none of its own.
+    #[arg(
+        long, value_name = "WxH", value_parser = values::picture_size, allow_hyphen_values = true,
+        default_value = DEFAULT_SIZE
+    )]
+    pub(crate) size: [u32; 2],
+    /// Print results.json to standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// One of equal shares of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Share {
+    /// Which one, from 1.
+    pub(crate) index: u32,
+    /// Of how many.
+    pub(crate) count: u32,
 }
 
 /// `umbrage plan`.
@@ -178,6 +226,23 @@ pub(crate) struct SceneArgs {
     pub(crate) opaque: bool,
 }
 
+/// What to compare with the truth, and how finely.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ComparisonArgs {
+    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
+    #[arg(long_help = SHADOWS_HELP,
+        long, value_name = "SPEC",
+        default_values = DEFAULT_TECHNIQUES
+    )]
+    pub(crate) shadows: Vec<Technique>,
+    /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
+    /// comparisons use 1.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) samples: u32,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+}
+
 /// Who looks on. What is left out comes from the scene.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "View")]
@@ -203,11 +268,11 @@ pub(crate) struct ViewArgs {
     /// Size of the picture, pixels.
     #[arg(
         long, value_name = "WxH", value_parser = values::picture_size, allow_hyphen_values = true,
-        default_value = "960x540"
+        default_value = DEFAULT_SIZE
     )]
     pub(crate) size: [u32; 2],
     /// A camera of the scene, by name.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["eye", "target", "up"])]
+    #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
 }
 
@@ -216,10 +281,7 @@ pub(crate) struct ViewArgs {
 #[command(next_help_heading = "Light")]
 pub(crate) struct LightArgs {
     /// Parallel light: the way it travels.
-    #[arg(
-        long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true,
-        conflicts_with = "light"
-    )]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
     pub(crate) sun: Option<DVec3>,
     /// A light of the scene, by name.
     #[arg(long, value_name = "NAME")]
@@ -244,6 +306,9 @@ pub(crate) enum Backend {
     /// Rays on the CPU.
     Reference,
 }
+
+/// Size of pictures where none is given.
+const DEFAULT_SIZE: &str = "960x540";
 
 /// What `compare` compares if not told.
 pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "tsm", "adaptive"];
@@ -275,6 +340,7 @@ pub(crate) fn parse(
     let checked = match &command {
         Command::Render(render) => render.check(),
         Command::Compare(compare) => compare.check(),
+        Command::Sweep(sweep) => sweep.comparison.check(),
         Command::Plan(plan) => plan.check(),
         Command::Scenes(_) => Ok(()),
     };
@@ -295,6 +361,7 @@ pub(crate) fn one_line(error: &clap::Error) -> String {
 impl Render {
     fn check(&self) -> Result<()> {
         self.view.check()?;
+        self.light.check()?;
         self.execution.check()?;
         self.picture_kind().map(drop)
     }
@@ -322,6 +389,13 @@ pub(crate) enum PictureKind {
 impl Compare {
     fn check(&self) -> Result<()> {
         self.view.check()?;
+        self.light.check()?;
+        self.comparison.check()
+    }
+}
+
+impl ComparisonArgs {
+    fn check(&self) -> Result<()> {
         self.execution.check()?;
         for (i, technique) in self.shadows.iter().enumerate() {
             let is_new = !self.shadows[..i].contains(technique);
@@ -334,6 +408,7 @@ impl Compare {
 impl Plan {
     fn check(&self) -> Result<()> {
         self.view.check()?;
+        self.light.check()?;
         if self.scene.is_some() {
             return Ok(());
         }
@@ -357,7 +432,12 @@ impl Plan {
 }
 
 impl ViewArgs {
-    fn check(&self) -> Result<()> {
+    /// Whether the values, each right by itself, go together.
+    pub(crate) fn check(&self) -> Result<()> {
+        let own = [("eye", self.eye), ("target", self.target), ("up", self.up)];
+        if let Some((option, _)) = own.iter().find(|(_, v)| self.camera.is_some() && v.is_some()) {
+            bail!("--camera: cannot be used with --{option}");
+        }
         if let (Some(near), Some(far)) = (self.near, self.far) {
             ensure!(near < far, "--far: must exceed --near ({near}), is {far}");
         }
@@ -368,7 +448,20 @@ impl ViewArgs {
     }
 }
 
+impl LightArgs {
+    /// Whether the values, each right by itself, go together.
+    pub(crate) fn check(&self) -> Result<()> {
+        ensure!(self.sun.is_none() || self.light.is_none(), "--light: cannot be used with --sun");
+        Ok(())
+    }
+}
+
 impl ExecutionArgs {
+    /// What renders the shadow maps in the end.
+    pub(crate) fn executor(&self) -> &'static str {
+        "reference"
+    }
+
     /// Says which backend `auto` takes.
     pub(crate) fn announce(&self) {
         if self.backend == Backend::Auto {

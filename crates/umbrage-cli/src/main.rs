@@ -4,6 +4,7 @@
 
 mod args;
 mod compare;
+mod comparison;
 mod output;
 mod pixels;
 mod plan;
@@ -12,6 +13,7 @@ mod render;
 mod scenes;
 mod setup;
 mod spec;
+mod sweep;
 mod values;
 
 use args::Command;
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
     finish(match &command {
         Command::Render(args) => render::run(args, quiet),
         Command::Compare(args) => compare::run(args, quiet),
+        Command::Sweep(args) => sweep::run(args, quiet),
         Command::Plan(args) => plan::run(args),
         Command::Scenes(args) => scenes::run(args),
     })
@@ -47,9 +50,7 @@ fn finish(result: anyhow::Result<()>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            // One line, whatever the causes say.
-            let line = format!("{e:#}").split_whitespace().collect::<Vec<_>>().join(" ");
-            output::note(&format!("umbrage: {line}"));
+            output::note(&format!("umbrage: {}", output::one_line(&e)));
             ExitCode::FAILURE
         }
     }

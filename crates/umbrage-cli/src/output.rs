@@ -1,8 +1,15 @@
 //! Standard output, standard error, and files that are there whole or not at all.
 
 use anyhow::{Context, Result, bail, ensure};
+use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+/// How the names of all that is unfinished begin.
+pub(crate) const TEMPORARY: &str = ".umbrage-";
+
+/// What a view of a sweep was made from, beside its report or instead of one.
+pub(crate) const VIEW_RECORD: &str = "view.json";
 
 /// Writes to standard output. A reader that went away has seen enough: no error.
 pub(crate) fn print(text: &str) -> Result<()> {
@@ -17,6 +24,45 @@ pub(crate) fn print(text: &str) -> Result<()> {
 pub(crate) fn note(line: &str) {
     // There is nowhere left to complain to.
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// The command line of this process, to be pasted into a shell.
+pub(crate) fn command_line() -> String {
+    let mut words = vec!["umbrage".to_owned()];
+    words.extend(std::env::args_os().skip(1).map(|w| quoted(&w.to_string_lossy())));
+    words.join(" ")
+}
+
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=+,./:@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// Rows of equally many cells as lines of text: the first column flush left, the others right.
+pub(crate) fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
+    let widths: [usize; N] =
+        std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
+    let mut text = String::new();
+    for row in rows {
+        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
+            // Writing to a string cannot fail.
+            let _ = match i {
+                0 => write!(text, "{cell:<width$}"),
+                _ => write!(text, "  {cell:>width$}"),
+            };
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// An error and its causes on one line, whatever they say.
+pub(crate) fn one_line(error: &anyhow::Error) -> String {
+    format!("{error:#}").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The folder that holds `path`, or an error of the option `--output` that names what is missing.
@@ -46,7 +92,7 @@ impl Staging {
     /// An empty folder in `parent`.
     pub(crate) fn new(parent: &Path) -> Result<Self> {
         for attempt in 0..1000 {
-            let path = parent.join(format!(".umbrage-{}-{attempt}", std::process::id()));
+            let path = parent.join(format!("{TEMPORARY}{}-{attempt}", std::process::id()));
             match std::fs::create_dir(&path) {
                 Ok(()) => return Ok(Self { path }),
                 Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
@@ -97,13 +143,16 @@ impl ReportFolder {
             .with_context(|| format!("--output: cannot read {target}"))?;
         let names: Vec<String> =
             entries.iter().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
-        let is_report = ["index.html", "report.json"].iter().all(|f| names.iter().any(|n| n == f));
+        let has = |file: &str| names.iter().any(|n| n == file);
+        let is_report = has("index.html") && has("report.json") || has(VIEW_RECORD);
         ensure!(
             names.is_empty() || is_report,
             "--output: {target} holds something other than a report; take another folder or empty it"
         );
-        let is_ours =
-            |name: &String| name == "index.html" || name == "report.json" || name.ends_with(".png");
+        let is_ours = |name: &String| {
+            ["index.html", "report.json", VIEW_RECORD].contains(&name.as_str())
+                || name.ends_with(".png")
+        };
         if let Some(strange) = names.iter().find(|n| !is_ours(n)) {
             bail!(
                 "--output: {target} holds {strange}, which is not part of a report; take another folder \
@@ -115,11 +164,11 @@ impl ReportFolder {
 
     /// Puts a new report in place, whole: `write` fills a folder, which then takes the place of
     /// whatever stood there.
-    pub(crate) fn replace(&self, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    pub(crate) fn replace<T>(&self, write: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
         let new = Staging::new(&self.parent)?;
         let report = new.path().join("new");
         std::fs::create_dir(&report).context("--output")?;
-        write(&report)?;
+        let written = write(&report)?;
         // Someone may have put something there while we worked.
         self.check_replaceable()?;
         let former = new.path().join("former");
@@ -135,6 +184,7 @@ impl ReportFolder {
                 }
             })
         };
-        swap().with_context(|| format!("--output: cannot write {}", self.target.display()))
+        swap().with_context(|| format!("--output: cannot write {}", self.target.display()))?;
+        Ok(written)
     }
 }

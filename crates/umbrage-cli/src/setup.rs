@@ -3,7 +3,7 @@
 use crate::args::{LightArgs, ViewArgs};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::DVec3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use umbrage::{Aabb, Camera, Light, LookAt};
 use umbrage_scene::{Scene, SceneCamera, builtins};
 
@@ -41,7 +41,12 @@ pub(crate) struct Lamp {
 
 /// The scene of this name: a file if there is one, else a built-in scene, `name` or `name:size`.
 pub(crate) fn open_scene(name: &str) -> Result<Scene> {
-    let scene = read_scene(name)?;
+    open_scene_in(Path::new(""), name)
+}
+
+/// As [`open_scene`], files being looked for from `folder`.
+pub(crate) fn open_scene_in(folder: &Path, name: &str) -> Result<Scene> {
+    let scene = read_scene(folder, name)?;
     ensure!(scene.drawn_triangles() > 0, "SCENE: {name} has no triangles to draw");
     log::info!(
         "{name}: {} triangles drawn, {} stored, {} cameras, {} lights",
@@ -60,20 +65,26 @@ pub(crate) fn tell_notices(scene: &Scene) {
     }
 }
 
-fn read_scene(name: &str) -> Result<Scene> {
-    let path = Path::new(name);
-    if path.exists() && !path.is_dir() {
-        return Ok(umbrage_scene::load(path)?);
+/// The file of a scene; `None` if it is not there, then the scene may be built in.
+pub(crate) fn scene_file(folder: &Path, name: &str) -> Option<PathBuf> {
+    Some(folder.join(name)).filter(|path| path.exists() && !path.is_dir())
+}
+
+fn read_scene(folder: &Path, name: &str) -> Result<Scene> {
+    if let Some(path) = scene_file(folder, name) {
+        return Ok(umbrage_scene::load(&path)?);
     }
+    let path = folder.join(name);
     let (builtin, size) = match name.split_once(':') {
         None => (name, None),
         Some((builtin, size)) => (builtin, Some(size)),
     };
     let names: Vec<&str> = builtins().iter().map(|b| b.name).collect();
     if !names.contains(&builtin) {
-        ensure!(!path.is_dir(), "SCENE: {name} is a folder, must be a .gltf or .glb file");
+        let shown = path.display();
+        ensure!(!path.is_dir(), "SCENE: {shown} is a folder, must be a .gltf or .glb file");
         let is_path = name.contains(['/', '\\', '.']);
-        ensure!(!is_path, "SCENE: there is no file {name}");
+        ensure!(!is_path, "SCENE: there is no file {shown}");
         bail!(
             "SCENE: there is neither a file nor a built-in scene `{name}`; did you mean `{}`? (built in are {})",
             crate::spec::nearest(builtin, &names),

@@ -17,7 +17,7 @@ fn desk() -> Desk {
     desk
 }
 
-fn refuses(desk: &Desk, args: &[&str], expected: &str) {
+pub(crate) fn refuses(desk: &Desk, args: &[&str], expected: &str) {
     let before = desk.listing();
     let run = desk.run(args);
     assert!(run.code == 1 || run.code == 2, "{args:?}: exit code {}", run.code);

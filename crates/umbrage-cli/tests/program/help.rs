@@ -3,7 +3,7 @@ use crate::desk::Desk;
 #[test]
 fn every_command_has_help_with_an_example() {
     let desk = Desk::new();
-    for command in [&[][..], &["render"], &["compare"], &["plan"], &["scenes"]] {
+    for command in [&[][..], &["render"], &["compare"], &["sweep"], &["plan"], &["scenes"]] {
         for flag in ["--help", "-h"] {
             let args = [command, &[flag]].concat();
             let run = desk.run(&args);
@@ -32,16 +32,21 @@ fn the_version_is_the_packages() {
 fn examples_of_the_help_parse() {
     // What needs no file of the user's must run as printed; the rest must be understood up to that.
     let desk = Desk::new();
-    for command in ["render", "compare", "plan", "scenes"] {
+    for command in ["render", "compare", "sweep", "plan", "scenes"] {
         let help = desk.succeed(&[command, "--help"]);
         let examples = help.split("Examples:").nth(1).unwrap().replace("\\\n", " ");
         for example in examples.lines().map(str::trim).filter(|l| l.starts_with("umbrage")) {
             let words: Vec<&str> = example.split_whitespace().skip(1).collect();
-            let needs_file = words.iter().any(|w| w.ends_with(".glb"));
+            let needs_file = words.iter().any(|w| w.ends_with(".glb") || w.ends_with(".json"));
             let is_long = command == "compare" || command == "render";
             if needs_file {
                 let run = desk.run(&words);
-                assert!(run.stderr.contains("there is no file"), "{example}: {}", run.stderr);
+                let understood = ["there is no file", "No such file"];
+                assert!(
+                    understood.iter().any(|u| run.stderr.contains(u)),
+                    "{example}: {}",
+                    run.stderr
+                );
             } else if !is_long {
                 desk.succeed(&words);
             }

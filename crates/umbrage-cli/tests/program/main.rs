@@ -8,3 +8,4 @@ mod help;
 mod plan;
 mod render;
 mod scenes;
+mod sweep;

@@ -1,0 +1,297 @@
+//! One view's comparison: techniques against ray-traced truth, as pictures, figures and a page in a folder.
+
+use crate::args;
+use crate::pixels::{self, Shadowed, Texels, counted, milliseconds};
+use crate::progress::Progress;
+use crate::setup::{Lamp, Onlooker, lamp, onlooker};
+use crate::spec::Technique;
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+use umbrage::{Bounds, Light, Plan, ShadowMap};
+use umbrage_measure::{
+    ErrorScale, Image, LightInfo, Measured, Page, Pictures, Report, Rgb, Seen, SeenTruth, Times,
+    Truth, measure, measure_error_px, partition_map, texel_map, write_pictures, write_report,
+    write_truth_pictures,
+};
+use umbrage_scene::Scene;
+use umbrage_trace::{Reference, Tracer, View};
+
+/// A scene, ready for rays of many views.
+pub(crate) struct Stage<'a> {
+    scene: &'a Scene,
+    tracer: Tracer<'a>,
+    opaque: bool,
+}
+
+/// What to compare in which view, planned.
+pub(crate) struct Comparison<'a> {
+    stage: &'a Stage<'a>,
+    options: &'a args::ComparisonArgs,
+    onlooker: Onlooker,
+    lamp: Lamp,
+    view: View<'a>,
+    /// One a technique, and how long planning took, milliseconds.
+    plans: Vec<(Plan, f64)>,
+}
+
+/// A comparison whose rays are all cast; what is left is to measure and to write.
+pub(crate) struct Compared<'a> {
+    comparison: &'a Comparison<'a>,
+    truth: TruthSoFar,
+    contenders: Vec<Contender<'a>>,
+}
+
+/// A technique at work: its maps, and the picture so far.
+struct Contender<'a> {
+    technique: &'a Technique,
+    backend: &'static str,
+    plan: &'a Plan,
+    reference: Reference<'a>,
+    ms: Times,
+    shadowed: Shadowed,
+    texels: Texels,
+}
+
+/// The truth's picture so far.
+#[derive(Default)]
+struct TruthSoFar {
+    shadowed: Shadowed,
+    counted: Vec<bool>,
+    seconds: f64,
+}
+
+/// What shadows look like, done.
+struct Picture {
+    color: Image<Rgb>,
+    visibility: Image<f32>,
+}
+
+impl<'a> Stage<'a> {
+    /// `opaque`: alpha-masked materials cast and show as solid.
+    pub(crate) fn new(scene: &'a Scene, opaque: bool) -> Result<Self> {
+        Ok(Self { scene, tracer: Tracer::new(scene)?.opaque(opaque), opaque })
+    }
+
+    /// What readers of a report should know.
+    fn notices(&self) -> Vec<String> {
+        let mut notices: Vec<String> = self.scene.notices.iter().map(|n| n.0.clone()).collect();
+        if self.opaque {
+            notices
+                .push("Alpha masks are ignored: masked materials show and cast as solid.".into());
+        }
+        notices
+    }
+}
+
+impl<'a> Comparison<'a> {
+    /// Plans every technique for this view and light.
+    pub(crate) fn new(
+        stage: &'a Stage<'a>,
+        view: &args::ViewArgs,
+        light: &args::LightArgs,
+        options: &'a args::ComparisonArgs,
+    ) -> Result<Self> {
+        let onlooker = onlooker(view, Some(stage.scene))?;
+        let lamp = lamp(light, Some(stage.scene))?;
+        let view = View::new(&stage.tracer, onlooker.camera, lamp.light, options.samples)
+            .context("--samples")?;
+        let bounds = Bounds::of_scene(stage.scene.bounds());
+        let plan = |t| pixels::plan(t, &onlooker.camera, &lamp.light, &bounds);
+        let plans = options.shadows.iter().map(plan).collect::<Result<Vec<_>>>()?;
+        Ok(Self { stage, options, onlooker, lamp, view, plans })
+    }
+
+    fn height(&self) -> u64 {
+        u64::from(self.onlooker.camera.image()[1])
+    }
+
+    /// Rows of rays and of measuring that there are to do.
+    pub(crate) fn rows(&self) -> u64 {
+        let plans = self.plans.iter().zip(&self.options.shadows);
+        let rows_of_maps: u64 = plans.map(|((plan, _), t)| Reference::rows(plan, t.filter)).sum();
+        // Of the picture: what is seen, the truth; each technique's lookups and measuring.
+        rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
+    }
+
+    /// Renders the maps, and traces the truth and every technique's picture.
+    pub(crate) fn trace(&self, progress: &Progress) -> Result<Compared<'_>> {
+        let mut contenders = Vec::new();
+        for (technique, (plan, ms)) in self.options.shadows.iter().zip(&self.plans) {
+            progress.stage(format!("{}: shadow map", technique.spec));
+            let start = Instant::now();
+            let reference =
+                Reference::render(&self.stage.tracer, plan, technique.filter, &|rows| {
+                    progress.advance(rows);
+                })?;
+            contenders.push(Contender {
+                technique,
+                backend: self.options.execution.executor(),
+                plan,
+                reference,
+                ms: Times { plan: Some(*ms), depth: Some(milliseconds(start)), ..Times::default() },
+                shadowed: Shadowed::default(),
+                texels: Texels::default(),
+            });
+        }
+        let truth = trace(&self.view, &mut contenders, progress);
+        Ok(Compared { comparison: self, truth, contenders })
+    }
+}
+
+impl Compared<'_> {
+    /// Whether any pixel [counts](counted).
+    pub(crate) fn has_shadows(&self) -> bool {
+        self.truth.counted.contains(&true)
+    }
+
+    /// Measures, and writes `index.html`, `report.json` and the pictures into an empty `folder`.
+    /// `command` is what makes the report again.
+    pub(crate) fn write(self, folder: &Path, command: &str, progress: &Progress) -> Result<Report> {
+        progress.stage("measuring");
+        let Comparison { stage, options, onlooker, lamp, .. } = self.comparison;
+        let size = onlooker.camera.image();
+        let seconds = Some(self.truth.seconds);
+        let counted = Image::new(size, self.truth.counted)?;
+        let truth = Picture::new(size, self.truth.shadowed)?;
+        let seen =
+            SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
+        let truth_pictures = write_truth_pictures(folder, &seen)?;
+        let finished = self.contenders.into_par_iter().enumerate().map(|(i, contender)| {
+            let finished = contender.finish(i + 1, folder, &seen);
+            progress.advance(self.comparison.height());
+            finished
+        });
+        let (results, pictures): (_, Vec<Pictures>) =
+            finished.collect::<Result<Vec<_>>>()?.into_iter().unzip();
+        let report = Report {
+            scene: stage.scene.name.clone(),
+            size,
+            view: view_info(onlooker),
+            light: light_info(lamp),
+            truth: Truth { rays_per_pixel: options.samples.pow(2), seconds },
+            results,
+        };
+        write_report(
+            folder,
+            &Page {
+                report: &report,
+                truth: &truth_pictures,
+                pictures: &pictures,
+                scale: ErrorScale::default(),
+                notices: &stage.notices(),
+                command: Some(command),
+            },
+        )?;
+        Ok(report)
+    }
+}
+
+/// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that all
+/// share what the camera sees.
+fn trace(view: &View<'_>, contenders: &mut [Contender<'_>], progress: &Progress) -> TruthSoFar {
+    let advance = |rows| progress.advance(rows);
+    let mut truth = TruthSoFar::default();
+    for rows in view.bands() {
+        progress.stage("ray-traced truth");
+        let start = Instant::now();
+        let band = view.band(rows, &advance);
+        let visibility = band.map(|s| view.truth(s), &advance);
+        truth.seconds += start.elapsed().as_secs_f64();
+        truth.counted.extend(counted(view, &band));
+        truth.shadowed.push(view, &band, &visibility);
+        for contender in contenders.iter_mut() {
+            progress.stage(format!("{}: picture", contender.technique.spec));
+            let start = Instant::now();
+            let visibility = band.map(|s| contender.reference.visibility(0, s), &advance);
+            *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
+            contender.shadowed.push(view, &band, &visibility);
+            contender.texels.push(view, &band, contender.plan, &contender.reference);
+        }
+    }
+    truth
+}
+
+impl Contender<'_> {
+    /// Measures the technique and writes its pictures into `folder`.
+    fn finish(
+        self,
+        index: usize,
+        folder: &Path,
+        truth: &SeenTruth<'_>,
+    ) -> Result<(Measured, Pictures)> {
+        let size = truth.visibility.size();
+        let picture = Picture::new(size, self.shadowed)?;
+        let error_px = Image::new(size, self.texels.error)?;
+        let texels = texel_map(&Image::new(size, self.texels.texel)?, &picture.color)?;
+        // Where one map serves all there is nothing to tell apart.
+        let partition = if self.plan.maps.iter().filter(|m| !ShadowMap::is_empty(m)).count() > 1 {
+            Some(partition_map(&Image::new(size, self.texels.map)?, &picture.color)?)
+        } else {
+            None
+        };
+        let shadows = self.technique.spec.to_string();
+        let seen = Seen {
+            color: &picture.color,
+            visibility: &picture.visibility,
+            error_px: &error_px,
+            partition: partition.as_ref(),
+            texels: Some(&texels),
+        };
+        let pictures =
+            write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
+        let measured = Measured {
+            shadows,
+            backend: self.backend.into(),
+            maps: self.plan.maps.len() as u32,
+            texels: self.plan.texels(),
+            metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
+            error_px: measure_error_px(&error_px, truth.counted)?,
+            storage_factor: Some(self.plan.storage_factor()),
+            ms: self.ms,
+        };
+        Ok((measured, pictures))
+    }
+}
+
+impl Picture {
+    fn new(size: [u32; 2], pixels: Shadowed) -> Result<Self> {
+        Ok(Self {
+            color: Image::new(size, pixels.color)?,
+            visibility: Image::new(size, pixels.visibility)?,
+        })
+    }
+}
+
+fn view_info(onlooker: &Onlooker) -> umbrage_measure::View {
+    let look = &onlooker.look;
+    umbrage_measure::View {
+        name: onlooker.name.clone(),
+        eye: look.eye.to_array(),
+        target: look.target.to_array(),
+        up: look.up.to_array(),
+        fov: look.fov_y_rad.to_degrees(),
+        near: look.near,
+        far: look.far,
+    }
+}
+
+fn light_info(lamp: &Lamp) -> LightInfo {
+    let name = lamp.name.clone();
+    match lamp.light {
+        Light::Directional { direction } => {
+            LightInfo::Directional { name, direction: direction.normalize_or_zero().to_array() }
+        }
+        Light::Spot(spot) => LightInfo::Spot {
+            name,
+            position: spot.position.to_array(),
+            direction: spot.direction.normalize_or_zero().to_array(),
+            half_angle: spot.half_angle_rad.to_degrees(),
+            range: spot.range,
+        },
+        Light::Point(point) => {
+            LightInfo::Point { name, position: point.position.to_array(), range: point.range }
+        }
+    }
+}
