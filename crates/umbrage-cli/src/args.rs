@@ -61,6 +61,8 @@ pub(crate) struct Render {
     /// How to make shadows, as in lispsm:pcf3@2048.
     #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: Technique,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
     /// What to write.
     #[arg(long, value_enum, default_value_t = Aov::Color)]
     pub(crate) aov: Aov,
@@ -113,6 +115,8 @@ pub(crate) struct Compare {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
     /// Print report.json to standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -182,7 +186,8 @@ pub(crate) struct Share {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  umbrage plan town --shadows adaptive@2048 --json
+  umbrage plan town --shadows adaptive+z4@2048 --json
+  umbrage plan town --shadows lispsm+z3 --max-error 1
   umbrage plan --eye 0,2,0 --target 0,2,-1 --fov 60 --near 0.1 --far 500 --size 1280x720 \\
       --sun 0.3,-1,0.2 --shadows lispsm@1024 --json")]
 pub(crate) struct Plan {
@@ -193,13 +198,15 @@ pub(crate) struct Plan {
     /// How to make shadows, as in lispsm:pcf3@2048.
     #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: Technique,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) view: ViewArgs,
     #[command(flatten)]
-    pub(crate) light: LightArgs,
+    pub(crate) lights: LightsArgs,
 }
 
 /// `umbrage scenes`.
@@ -288,6 +295,27 @@ pub(crate) struct LightArgs {
     pub(crate) light: Option<String>,
 }
 
+/// What shines, one light or more. Left out: as for one.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct LightsArgs {
+    /// Parallel light: the way it travels.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    sun: Option<DVec3>,
+    /// A light of the scene, by name; once for each.
+    #[arg(long, value_name = "NAME")]
+    light: Vec<String>,
+}
+
+/// How many texels there are where specifications do not say.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct TexelArgs {
+    /// Take the fewest texels with which none gets wider than PX pixels, before any surface's slope, in
+    /// place of @TEXELS.
+    #[arg(long, value_name = "PX", value_parser = values::pixels_per_texel, allow_hyphen_values = true)]
+    max_error: Option<f64>,
+}
+
 /// What does the work.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ExecutionArgs {
@@ -315,12 +343,20 @@ pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "t
 
 /// The shadow specification language, as far as this version can execute it.
 const SHADOWS_HELP: &str = "\
-How to make shadows: WARP[:FILTER][@TEXELS], as in lispsm:pcf3@2048.
-WARP:   unfocused, uniform, psm, lispsm, tsm, tsm(focus=METRES),
-        adaptive, adaptive(area), log, lambda=METRES.
+How to make shadows: WARP[+zK][+face][:FILTER][@TEXELS], as in
+lispsm+z4:pcf3@2048.
+WARP:   unfocused, uniform, uniform(stable), psm, lispsm, tsm,
+        tsm(focus=METRES), adaptive, adaptive(area), log, lambda=METRES.
++zK:    1 to 16 slices along the view with a map each, self-similar unless
+        told: +z4(fitted), +z4(practical=0.5), +z4(at=5/20/60) metres.
+        +z4(overlap=0.1) fades from each to the next over a tenth of its
+        length; +z4(fitted,overlap=0.1) does both.
++face:  maps for the four sides of the view and its near face;
+        +face(sides) without the near face.
 FILTER: hard (default), or pcfN for the mean over N×N texels.
-TEXELS: a budget of TEXELS² texels, shared between s and t as the view
-        needs it (default 1024), or WxH for exactly these.";
+TEXELS: a budget of TEXELS² texels for all maps, shared among them and
+        between s and t as the view needs it (default 1024), or WxH for
+        exactly these in every map.";
 
 /// What is done if no command is given.
 const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
@@ -333,11 +369,11 @@ pub(crate) fn parse(
     words: impl IntoIterator<Item = OsString>,
 ) -> Result<(Command, u8), clap::Error> {
     let Cli { verbose, command } = Cli::try_parse_from(words)?;
-    let Some(command) = command else {
+    let Some(mut command) = command else {
         let main_job = MAIN_JOB.map(OsString::from);
         return parse(main_job).map(|(command, _)| (command, verbose));
     };
-    let checked = match &command {
+    let checked = match &mut command {
         Command::Render(render) => render.check(),
         Command::Compare(compare) => compare.check(),
         Command::Sweep(sweep) => sweep.comparison.check(),
@@ -359,7 +395,8 @@ pub(crate) fn one_line(error: &clap::Error) -> String {
 }
 
 impl Render {
-    fn check(&self) -> Result<()> {
+    fn check(&mut self) -> Result<()> {
+        self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.check()?;
         self.light.check()?;
         self.execution.check()?;
@@ -387,7 +424,8 @@ pub(crate) enum PictureKind {
 }
 
 impl Compare {
-    fn check(&self) -> Result<()> {
+    fn check(&mut self) -> Result<()> {
+        self.texels.apply(&mut self.comparison.shadows)?;
         self.view.check()?;
         self.light.check()?;
         self.comparison.check()
@@ -406,9 +444,10 @@ impl ComparisonArgs {
 }
 
 impl Plan {
-    fn check(&self) -> Result<()> {
+    fn check(&mut self) -> Result<()> {
+        self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.check()?;
-        self.light.check()?;
+        self.lights.check()?;
         if self.scene.is_some() {
             return Ok(());
         }
@@ -423,11 +462,49 @@ impl Plan {
             ensure!(is_given, "{option} is needed where no SCENE is given");
         }
         for (option, is_given) in
-            [("--camera", view.camera.is_some()), ("--light", self.light.light.is_some())]
+            [("--camera", view.camera.is_some()), ("--light", !self.lights.light.is_empty())]
         {
             ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
         }
         Ok(())
+    }
+}
+
+impl TexelArgs {
+    /// Gives the error to the techniques that do not say how many texels they have.
+    fn apply(self, techniques: &mut [Technique]) -> Result<()> {
+        let Some(pixels) = self.max_error else { return Ok(()) };
+        if let Some(told) = techniques.iter().find(|t| t.spec.size.is_some())
+            && techniques.iter().all(|t| t.spec.size.is_some())
+        {
+            bail!(
+                "--max-error: `{}` says how many texels there are; leave out either of them",
+                told.spec
+            );
+        }
+        for technique in techniques {
+            technique.limit_error(pixels);
+        }
+        Ok(())
+    }
+}
+
+impl LightsArgs {
+    /// Each light for itself; one that says nothing if none was named.
+    pub(crate) fn each(&self) -> Vec<LightArgs> {
+        let one = |light| LightArgs { sun: self.sun, light };
+        if self.light.is_empty() {
+            vec![one(None)]
+        } else {
+            self.light.iter().cloned().map(Some).map(one).collect()
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        for (i, name) in self.light.iter().enumerate() {
+            ensure!(!self.light[..i].contains(name), "--light: `{name}` is given twice");
+        }
+        self.each().iter().try_for_each(LightArgs::check)
     }
 }
 

@@ -38,6 +38,8 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 fn table(report: &Report) -> String {
     let head = [
         "shadows",
+        "maps",
+        "texels",
         "wrong",
         "false light",
         "mean error",
@@ -54,6 +56,8 @@ fn table(report: &Report) -> String {
         let (m, e) = (&r.metrics, &r.error_px);
         [
             r.shadows.clone(),
+            r.maps.to_string(),
+            r.texels.to_string(),
             percent(m.wrong_fraction),
             percent(m.false_light),
             number(m.mean_abs_error, 4),

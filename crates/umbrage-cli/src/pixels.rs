@@ -155,7 +155,7 @@ pub(crate) fn plan(
         let start = Instant::now();
         let plan = planner.plan(camera, &[*light], bounds, &technique.options);
         let ms = milliseconds(start);
-        plan.map(|p| (p.clone(), ms)).map_err(|e| crate::setup::option_error(&e))
+        plan.map(|p| (p.clone(), ms)).map_err(|e| technique.error(&e))
     };
     plan()?;
     plan()

@@ -2,18 +2,40 @@
 
 use crate::args;
 use crate::output::print;
-use crate::setup::{Onlooker, lamp, onlooker, open_scene, option_error, tell_notices};
+use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene, tell_notices};
+use crate::spec::Technique;
 use anyhow::Result;
 use serde::Serialize;
 use std::fmt::Write;
-use umbrage::{Bounds, MapError, Planner, ShadowMap, Warp};
+use umbrage::{
+    Aabb, Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size,
+    Warp,
+};
+use umbrage_scene::Scene;
 
 #[derive(Serialize)]
 struct PlanJson {
     maps: Vec<MapJson>,
     storage_factor: f64,
     texels: u64,
+    /// The first light's.
     theta_deg: f64,
+    lights: Vec<LightJson>,
+    /// All maps side by side in one texture; `null` where that is too large for a device.
+    atlas: Option<AtlasJson>,
+    /// Each map in a layer of its own, with its gutter; `null` as for the atlas.
+    layers: Option<LayersJson>,
+    /// Share of the casters that need not be drawn, the mean over maps; `null` without a scene.
+    casters_culled: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct LightJson {
+    /// `null`: it has none.
+    name: Option<String>,
+    theta_deg: f64,
+    /// The first of its maps, and the first of the next light's.
+    maps: [usize; 2],
 }
 
 #[derive(Serialize)]
@@ -21,13 +43,25 @@ struct MapJson {
     /// Four columns.
     world_to_shadow: [[f64; 4]; 4],
     resolution: [u32; 2],
-    /// Metres along the view.
+    /// Metres along the view; of side faces, on the face.
     split: [f64; 2],
     /// `null`: the map serves the whole view.
     face: Option<&'static str>,
     /// `null`: no warp.
     lambda: Option<f64>,
     error: ErrorJson,
+    /// Index along the view, from the viewer.
+    slice: usize,
+    /// Index of the light.
+    light: usize,
+    /// Of the cube around a point light; `null` for other lights.
+    side: Option<&'static str>,
+    /// Whether there is nothing to serve.
+    empty: bool,
+    /// x, y, width and height in the atlas, texels; `null` without an atlas and for empty maps.
+    rect: Option<[u32; 4]>,
+    /// `null` without a scene.
+    casters: Option<Casters>,
 }
 
 /// Pixels per texel.
@@ -38,46 +72,234 @@ struct ErrorJson {
     max: f64,
 }
 
+#[derive(Serialize)]
+struct AtlasJson {
+    size: [u32; 2],
+    /// Around each map, texels.
+    gutter: u32,
+}
+
+#[derive(Serialize)]
+struct LayersJson {
+    size: [u32; 2],
+    count: u32,
+}
+
+/// Triangles of instances whose boxes may cast into a map, and of the others.
+#[derive(Clone, Copy, Default, Serialize)]
+struct Casters {
+    drawn: u64,
+    culled: u64,
+}
+
+/// A plan, and what follows from it.
+struct Planned<'a> {
+    technique: &'a Technique,
+    onlooker: &'a Onlooker,
+    lamps: &'a [Lamp],
+    plan: &'a Plan,
+    atlas: Option<Atlas>,
+    layers: Option<Atlas>,
+    /// One for each map; without a scene, none.
+    casters: Option<Vec<Casters>>,
+}
+
 /// Plans, and prints the plan.
 pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let scene = args.scene.as_deref().map(open_scene).transpose()?;
     let onlooker = onlooker(&args.view, scene.as_ref())?;
-    let lamp = lamp(&args.light, scene.as_ref())?;
+    let lamps: Vec<Lamp> =
+        args.lights.each().iter().map(|l| lamp(l, scene.as_ref())).collect::<Result<_>>()?;
     if let Some(scene) = &scene {
         tell_notices(scene);
     }
-    let bounds = scene.map_or_else(Bounds::default, |s| Bounds::of_scene(s.bounds()));
+    let bounds = scene.as_ref().map_or_else(Bounds::default, |s| Bounds::of_scene(s.bounds()));
+    let technique = &args.shadows;
+    let lights: Vec<Light> = lamps.iter().map(|l| l.light).collect();
     let mut planner = Planner::new();
     let plan = planner
-        .plan(&onlooker.camera, &[lamp.light], &bounds, &args.shadows.options)
-        .map_err(|e| option_error(&e))?;
+        .plan(&onlooker.camera, &lights, &bounds, &technique.options)
+        .map_err(|e| technique.error(&e))?;
+    let planned = Planned::new(plan, technique, &onlooker, &lamps, scene.as_ref());
     if args.json {
         if plan.maps.iter().all(ShadowMap::is_empty) {
             log::warn!("{}", nothing_served(&onlooker));
         }
-        print(&format!("{}\n", serde_json::to_string_pretty(&PlanJson::from(plan))?))
+        print(&format!("{}\n", serde_json::to_string_pretty(&planned.json())?))
     } else {
-        print(&table(plan, &onlooker, args))
+        print(&planned.table())
     }
 }
 
-impl From<&umbrage::Plan> for PlanJson {
-    fn from(plan: &umbrage::Plan) -> Self {
-        let maps = plan.maps.iter().map(|m| MapJson {
+impl<'a> Planned<'a> {
+    fn new(
+        plan: &'a Plan,
+        technique: &'a Technique,
+        onlooker: &'a Onlooker,
+        lamps: &'a [Lamp],
+        scene: Option<&Scene>,
+    ) -> Self {
+        let gutter = technique.filter.reach_texels();
+        let max_side = technique.options.max_side;
+        let [atlas, layers] = [Atlas::packed, Atlas::layered].map(|lay_out| {
+            lay_out(plan, gutter, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
+        });
+        let casters = scene.map(|s| casters(plan, s));
+        Self { technique, onlooker, lamps, plan, atlas, layers, casters }
+    }
+
+    /// Share of all triangles that are culled, the mean over maps that are not empty.
+    fn casters_culled(&self) -> Option<f64> {
+        let casters = self.plan.maps.iter().zip(self.casters.as_ref()?);
+        let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);
+        let [drawn, culled] =
+            of_full.fold([0, 0], |[d, c], casters| [d + casters.drawn, c + casters.culled]);
+        (drawn + culled > 0).then(|| culled as f64 / (drawn + culled) as f64)
+    }
+
+    /// x, y, width and height of a map in the atlas, texels.
+    fn rect(&self, map: usize) -> Option<[u32; 4]> {
+        let place = self.atlas.as_ref()?.places[map]?;
+        Some([place.origin[0], place.origin[1], place.size[0], place.size[1]])
+    }
+
+    fn json(&self) -> PlanJson {
+        let plan = self.plan;
+        let maps = plan.maps.iter().enumerate().map(|(i, m)| MapJson {
             world_to_shadow: m.shadow_from_world().to_cols_array_2d(),
             resolution: m.resolution,
             split: m.split,
-            face: None,
+            face: m.part.face.map(face_name),
             lambda: m.lambda,
             error: m.error.into(),
+            slice: m.part.slice,
+            light: m.part.light,
+            side: m.part.side.map(side_name),
+            empty: m.is_empty(),
+            rect: self.rect(i),
+            casters: self.casters.as_ref().map(|c| c[i]),
         });
-        Self {
+        let lights = plan.lights.iter().zip(self.lamps).map(|(light, lamp)| LightJson {
+            name: lamp.name.clone(),
+            theta_deg: light.theta_rad.to_degrees(),
+            maps: [light.maps.start, light.maps.end],
+        });
+        let atlas = self.atlas.as_ref();
+        let layers = self.layers.as_ref();
+        PlanJson {
             maps: maps.collect(),
             storage_factor: plan.storage_factor(),
             texels: plan.texels(),
             theta_deg: plan.lights[0].theta_rad.to_degrees(),
+            lights: lights.collect(),
+            atlas: atlas.map(|a| AtlasJson { size: a.size, gutter: a.gutter_texels }),
+            layers: layers.map(|l| LayersJson { size: l.size, count: l.layers }),
+            casters_culled: self.casters_culled(),
         }
     }
+
+    fn table(&self) -> String {
+        let plan = self.plan;
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let mut line = |l: std::fmt::Arguments<'_>| {
+            let _ = writeln!(text, "{l}");
+        };
+        line(format_args!("shadows         {}", self.technique.spec));
+        for (light, lamp) in plan.lights.iter().zip(self.lamps) {
+            let name = lamp.name.as_deref().filter(|_| self.lamps.len() > 1).unwrap_or("light");
+            line(format_args!("view and {name:<6} {:.2}° apart", light.theta_rad.to_degrees()));
+        }
+        let limit = match self.technique.options.size {
+            Size::MaxError(pixels) => format!(", for at most {pixels} px a texel"),
+            _ => String::new(),
+        };
+        line(format_args!("texels          {}{limit}", plan.texels()));
+        line(format_args!("storage factor  {:.6}", plan.storage_factor()));
+        if plan.maps.len() > 1 {
+            let atlas = match &self.atlas {
+                None => "too large for one texture".into(),
+                Some(a) => format!("{}, gutters of {}", sides(a.size), a.gutter_texels),
+            };
+            let layers = match &self.layers {
+                None => String::new(),
+                Some(l) => format!("; or {} layers of {}", l.layers, sides(l.size)),
+            };
+            line(format_args!("atlas           {atlas}{layers}"));
+        }
+        if let Some(share) = self.casters_culled() {
+            line(format_args!("culled          {}", percent(share)));
+        }
+        for (i, map) in plan.maps.iter().enumerate() {
+            line(format_args!(""));
+            let part = self.part(map.part);
+            if map.is_empty() {
+                let nothing = match plan.maps.len() {
+                    1 => nothing_served(self.onlooker),
+                    _ => "nothing lit there receives shadows".into(),
+                };
+                line(format_args!("map {i}: {part}empty: {nothing}"));
+                continue;
+            }
+            let size = sides(map.resolution);
+            let place = match self.rect(i) {
+                Some([x, y, ..]) if plan.maps.len() > 1 => format!(" at {x},{y}"),
+                _ => String::new(),
+            };
+            let [near, far] = map.split.map(six_digits);
+            line(format_args!("map {i}: {part}{size} texels{place}, {near} to {far} metres"));
+            let warp = match (map.lambda, self.technique.options.warp) {
+                // For light from a point λ is no length in the world.
+                (Some(lambda), _) if map.apex.is_some() => format!("λ = {lambda:.6}"),
+                (Some(lambda), _) => format!("λ = {lambda:.6} m"),
+                (None, Warp::Psm) => "the viewer's own perspective".into(),
+                (None, _) => "none".into(),
+            };
+            line(format_args!("  warp            {warp}"));
+            let e = map.error;
+            line(format_args!(
+                "  pixels a texel  {:.4} across, {:.4} along, {:.4} in the worst direction, at most",
+                e.max_s, e.max_t, e.max
+            ));
+            if let Some(Casters { drawn, culled }) = self.casters.as_ref().map(|c| c[i]) {
+                let share = percent(culled as f64 / (drawn + culled) as f64);
+                line(format_args!("  casters         {drawn} triangles, {share} culled"));
+            }
+            line(format_args!("  shadow_from_world (rows)"));
+            let matrix = map.shadow_from_world();
+            for row in 0..4 {
+                let [a, b, c, d] = matrix.row(row).to_array();
+                line(format_args!("    {a:>16.9} {b:>16.9} {c:>16.9} {d:>16.9}"));
+            }
+        }
+        text
+    }
+
+    /// What a map is for, as far as there are others.
+    fn part(&self, part: Part) -> String {
+        let name = || self.lamps[part.light].name.clone().unwrap_or_default();
+        let slices = self.technique.options.partition.slices;
+        let words = [
+            (self.lamps.len() > 1).then(name),
+            part.side.map(|s| format!("side {}", side_name(s))),
+            part.face.map(|f| format!("{} face", face_name(f))),
+            (slices > 1 && part.face != Some(Face::Near)).then(|| format!("slice {}", part.slice)),
+        ];
+        words.into_iter().flatten().fold(String::new(), |text, word| text + &word + ": ")
+    }
+}
+
+/// For each map, the triangles of the instances whose boxes may cast into it, and of the others.
+fn casters(plan: &Plan, scene: &Scene) -> Vec<Casters> {
+    let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
+    let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
+    let of_map = |map: &ShadowMap| {
+        instances.iter().fold(Casters::default(), |mut sum, &(aabb, triangles)| {
+            *(if map.may_cast(aabb) { &mut sum.drawn } else { &mut sum.culled }) += triangles;
+            sum
+        })
+    };
+    plan.maps.iter().map(of_map).collect()
 }
 
 impl From<MapError> for ErrorJson {
@@ -86,7 +308,28 @@ impl From<MapError> for ErrorJson {
     }
 }
 
-/// Why a map is empty.
+fn face_name(face: Face) -> &'static str {
+    match face {
+        Face::Bottom => "bottom",
+        Face::Right => "right",
+        Face::Top => "top",
+        Face::Left => "left",
+        Face::Near => "near",
+    }
+}
+
+fn side_name(side: CubeSide) -> &'static str {
+    match side {
+        CubeSide::PosX => "+x",
+        CubeSide::NegX => "-x",
+        CubeSide::PosY => "+y",
+        CubeSide::NegY => "-y",
+        CubeSide::PosZ => "+z",
+        CubeSide::NegZ => "-z",
+    }
+}
+
+/// Why all maps are empty.
 fn nothing_served(onlooker: &Onlooker) -> String {
     let [near, far] = [onlooker.look.near, onlooker.look.far].map(six_digits);
     format!("nothing lit between {near} and {far} metres of the view receives shadows")
@@ -97,42 +340,10 @@ fn six_digits(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 
-fn table(plan: &umbrage::Plan, onlooker: &Onlooker, args: &args::Plan) -> String {
-    let mut text = String::new();
-    // Writing to a string cannot fail.
-    let mut line = |l: std::fmt::Arguments<'_>| {
-        let _ = writeln!(text, "{l}");
-    };
-    line(format_args!("shadows         {}", args.shadows.spec));
-    line(format_args!("view and light  {:.2}° apart", plan.lights[0].theta_rad.to_degrees()));
-    line(format_args!("texels          {}", plan.texels()));
-    line(format_args!("storage factor  {:.6}", plan.storage_factor()));
-    for (i, map) in plan.maps.iter().enumerate() {
-        line(format_args!(""));
-        if map.is_empty() {
-            line(format_args!("map {i}: empty: {}", nothing_served(onlooker)));
-            continue;
-        }
-        let [w, h] = map.resolution;
-        let [near, far] = map.split.map(six_digits);
-        line(format_args!("map {i}: {w}x{h} texels, {near} to {far} metres"));
-        let warp = match (map.lambda, args.shadows.options.warp) {
-            (Some(lambda), _) => format!("λ = {lambda:.6} m"),
-            (None, Warp::Psm) => "the viewer's own perspective".into(),
-            (None, _) => "none".into(),
-        };
-        line(format_args!("  warp            {warp}"));
-        let e = map.error;
-        line(format_args!(
-            "  pixels a texel  {:.4} across, {:.4} along, {:.4} in the worst direction, at most",
-            e.max_s, e.max_t, e.max
-        ));
-        line(format_args!("  shadow_from_world (rows)"));
-        let matrix = map.shadow_from_world();
-        for row in 0..4 {
-            let [a, b, c, d] = matrix.row(row).to_array();
-            line(format_args!("    {a:>16.9} {b:>16.9} {c:>16.9} {d:>16.9}"));
-        }
-    }
-    text
+fn sides([w, h]: [u32; 2]) -> String {
+    format!("{w}x{h}")
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1}%", share * 100.0)
 }

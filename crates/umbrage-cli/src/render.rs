@@ -1,13 +1,13 @@
 //! `umbrage render`: one picture.
 
 use crate::args::{self, Aov, PictureKind};
-use crate::output::check_file;
+use crate::output::{check_file, note};
 use crate::pixels::{self, NOTHING_TO_SHADOW, Shadowed, Texels, counted, linear_color, middles};
 use crate::progress::Progress;
 use crate::setup::{lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use glam::DVec3;
-use umbrage::Bounds;
+use umbrage::{Bounds, Size};
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, partition_map, texel_map, write_exr,
     write_png,
@@ -49,6 +49,11 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let passes = 1 + u64::from(needs_truth) + u64::from(needs_map);
     tell_notices(&scene);
     args.execution.announce();
+    if let Size::MaxError(pixels) = args.shadows.options.size
+        && needs_map
+    {
+        note(&format!("texels: {} for at most {pixels} px a texel", plan.texels()));
+    }
     let progress = Progress::new(map_rows + height * passes, quiet);
     let advance = |rows| progress.advance(rows);
 

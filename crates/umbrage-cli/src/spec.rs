@@ -1,18 +1,20 @@
 //! The shadow specification language: `WARP[+zK][+face][:FILTER][@TEXELS]`.
 
 mod filter;
+mod partition;
 
 use anyhow::{Error, Result, anyhow, bail, ensure};
 pub(crate) use filter::Filter;
+use partition::{Part, Slices};
 use std::fmt::{self, Display};
 use std::str::FromStr;
-use umbrage::{Objective, Options, Size, Warp, visibility};
+use umbrage::{Faces, Objective, Options, Size, Warp, visibility};
 
 /// The longest side of a shadow map, texels; what today's GPUs allow.
 pub(crate) const MAX_SIDE: u32 = 16384;
 
-/// Texels on a side of the budget where none is given.
-const DEFAULT_SIDE: u32 = 1024;
+/// The budget where none is given.
+const DEFAULT_SIZE: TexelSize = TexelSize::Side(1024);
 
 /// One way to make shadows: how to lay out the maps and how to look them up.
 ///
@@ -22,10 +24,10 @@ const DEFAULT_SIDE: u32 = 1024;
 pub(crate) struct Spec {
     /// How texels are spread over what the camera sees.
     pub(crate) warp: Warp,
-    /// Number of z-partitions; `None`: one map.
-    pub(crate) z_partitions: Option<u32>,
-    /// Whether each side face of the view gets maps of its own.
-    pub(crate) face: bool,
+    /// Slices along the view; `None`: one.
+    pub(crate) slices: Option<Slices>,
+    /// Which faces of the view get maps of their own.
+    pub(crate) faces: Faces,
     /// How maps are looked up; `None`: `hard`.
     pub(crate) filter: Option<Filter>,
     /// How many texels; `None`: a budget of 1024².
@@ -44,6 +46,7 @@ pub(crate) enum TexelSize {
 const WARPS: &[&str] = &[
     "unfocused",
     "uniform",
+    "uniform(stable)",
     "psm",
     "lispsm",
     "tsm",
@@ -66,28 +69,48 @@ pub(crate) struct Technique {
 impl Technique {
     /// What executes `spec`, or why this version cannot.
     pub(crate) fn new(spec: Spec) -> Result<Self> {
-        let missing = |what: String| {
-            Err(anyhow!(
-                "{what} are not available in this version; one map with `hard` or `pcfN` is"
-            ))
-        };
-        if let Some(k) = spec.z_partitions {
-            return missing(format!("z-partitions (`+z{k}`)"));
-        }
-        if spec.face {
-            return missing("face partitions (`+face`)".into());
-        }
         let filter = match &spec.filter {
             None | Some(Filter::Hard) => visibility::Filter::Hard,
             Some(Filter::Pcf(n)) => visibility::Filter::pcf(*n)?,
-            Some(other) => return missing(format!("`{other}` filters")),
+            Some(other) => {
+                bail!("`{other}` filters are not available in this version; `hard` and `pcfN` are")
+            }
         };
-        let size = match spec.size.unwrap_or(TexelSize::Side(DEFAULT_SIDE)) {
+        let size = match spec.size.unwrap_or(DEFAULT_SIZE) {
             TexelSize::Side(n) => Size::Budget(u64::from(n).pow(2)),
             TexelSize::Exact(size) => Size::Exact(size),
         };
-        let options = Options { warp: spec.warp, size, max_side: MAX_SIDE, ..Options::default() };
+        let partition = partition::partition(spec.slices.as_ref(), spec.faces);
+        let options =
+            Options { warp: spec.warp, partition, size, max_side: MAX_SIDE, ..Options::default() };
         Ok(Self { spec, options, filter })
+    }
+
+    /// Takes the fewest texels for errors of at most this many pixels per texel, unless the
+    /// specification says how many texels there are.
+    pub(crate) fn limit_error(&mut self, pixels: f64) {
+        if self.spec.size.is_none() {
+            self.options.size = Size::MaxError(pixels);
+        }
+    }
+
+    /// A planner's complaint, naming what of the specification it is about.
+    pub(crate) fn error(&self, error: &umbrage::Error) -> Error {
+        let umbrage::Error::Invalid { field, problem } = error else {
+            return crate::setup::option_error(error);
+        };
+        let Spec { warp, slices, faces, size, .. } = &self.spec;
+        let part = match (field.strip_prefix("options."), self.options.size) {
+            (Some("warp.lambda" | "warp.focus"), _) => warp_text(*warp),
+            (Some("partition.faces"), _) => partition::faces_text(*faces).to_owned(),
+            (Some("partition.slices" | "partition.splits" | "partition.overlap"), _) => {
+                slices.as_ref().map(Slices::to_string).unwrap_or_default()
+            }
+            (Some("size"), Size::MaxError(pixels)) => format!("--max-error {pixels}"),
+            (Some("size"), _) => size.unwrap_or(DEFAULT_SIZE).to_string(),
+            _ => return crate::setup::option_error(error),
+        };
+        anyhow!("--shadows {}: `{part}`: {problem}", self.spec)
     }
 }
 
@@ -113,21 +136,15 @@ impl FromStr for Spec {
         let mut parts = layout.split('+');
         let mut spec = Self {
             warp: parse_warp(parts.next().unwrap_or_default())?,
-            z_partitions: None,
-            face: false,
+            slices: None,
+            faces: Faces::Whole,
             filter: filter.map(Filter::from_str).transpose()?,
             size: size.map(TexelSize::from_str).transpose()?,
         };
         for part in parts {
-            let twice = if part == "face" {
-                std::mem::replace(&mut spec.face, true)
-            } else if let Some(k) = part.strip_prefix('z').filter(|k| is_number(k)) {
-                spec.z_partitions.replace(parse_count(k, "+z", 1..=16)?).is_some()
-            } else {
-                bail!(
-                    "unknown partition `+{part}`: did you mean `+{}`?",
-                    nearest(part, &["zK", "face"])
-                );
+            let twice = match part.parse()? {
+                Part::Slices(slices) => spec.slices.replace(slices).is_some(),
+                Part::Faces(faces) => std::mem::replace(&mut spec.faces, faces) != Faces::Whole,
             };
             ensure!(!twice, "`+{part}`: a kind of partition can be given once");
         }
@@ -137,34 +154,42 @@ impl FromStr for Spec {
 
 impl Display for Spec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.warp {
-            Warp::Unfocused => f.write_str("unfocused")?,
-            Warp::Uniform => f.write_str("uniform")?,
-            Warp::Psm => f.write_str("psm")?,
-            Warp::Lispsm => f.write_str("lispsm")?,
-            Warp::Tsm { focus: None } => f.write_str("tsm")?,
-            Warp::Tsm { focus: Some(metres) } => write!(f, "tsm(focus={metres})")?,
-            Warp::Adaptive(Objective::Storage) => f.write_str("adaptive")?,
-            Warp::Adaptive(Objective::Area) => f.write_str("adaptive(area)")?,
-            Warp::Log => f.write_str("log")?,
-            Warp::Lambda(metres) => write!(f, "lambda={metres}")?,
-            // The planner may learn warps that this language has no name for yet.
-            other => write!(f, "{other:?}")?,
+        f.write_str(&warp_text(self.warp))?;
+        if let Some(slices) = &self.slices {
+            write!(f, "{slices}")?;
         }
-        if let Some(k) = self.z_partitions {
-            write!(f, "+z{k}")?;
-        }
-        if self.face {
-            f.write_str("+face")?;
-        }
+        f.write_str(partition::faces_text(self.faces))?;
         if let Some(filter) = &self.filter {
             write!(f, ":{filter}")?;
         }
-        match self.size {
-            None => Ok(()),
-            Some(TexelSize::Side(n)) => write!(f, "@{n}"),
-            Some(TexelSize::Exact([w, h])) => write!(f, "@{w}x{h}"),
+        self.size.map_or(Ok(()), |size| write!(f, "{size}"))
+    }
+}
+
+impl Display for TexelSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Side(n) => write!(f, "@{n}"),
+            Self::Exact([w, h]) => write!(f, "@{w}x{h}"),
         }
+    }
+}
+
+fn warp_text(warp: Warp) -> String {
+    match warp {
+        Warp::Unfocused => "unfocused".into(),
+        Warp::Stable => "uniform(stable)".into(),
+        Warp::Uniform => "uniform".into(),
+        Warp::Psm => "psm".into(),
+        Warp::Lispsm => "lispsm".into(),
+        Warp::Tsm { focus: None } => "tsm".into(),
+        Warp::Tsm { focus: Some(metres) } => format!("tsm(focus={metres})"),
+        Warp::Adaptive(Objective::Storage) => "adaptive".into(),
+        Warp::Adaptive(Objective::Area) => "adaptive(area)".into(),
+        Warp::Log => "log".into(),
+        Warp::Lambda(metres) => format!("lambda={metres}"),
+        // The planner may learn warps that this language has no name for yet.
+        other => format!("{other:?}"),
     }
 }
 
@@ -177,6 +202,10 @@ fn parse_warp(text: &str) -> Result<Warp> {
     match (name, options) {
         ("unfocused", None) => Ok(Warp::Unfocused),
         ("uniform", None) => Ok(Warp::Uniform),
+        ("uniform", Some("stable")) => Ok(Warp::Stable),
+        ("uniform", Some(option)) => {
+            bail!("unknown option `{option}` of `uniform`: did you mean `uniform(stable)`?")
+        }
         ("psm", None) => Ok(Warp::Psm),
         ("lispsm", None) => Ok(Warp::Lispsm),
         ("tsm", None) => Ok(Warp::Tsm { focus: None }),
@@ -197,8 +226,8 @@ fn parse_warp(text: &str) -> Result<Warp> {
         ("", None) => bail!("the warp is missing: it comes first, as in `uniform:pcf3@1024`"),
         (known, Some(_)) if WARPS.contains(&known) => bail!("`{text}`: `{known}` takes no options"),
         _ => bail!(
-            "unknown warp `{text}`: did you mean `{}`? (there are unfocused, uniform, psm, lispsm, tsm, \
-             adaptive, adaptive(area), log, lambda=NUMBER)",
+            "unknown warp `{text}`: did you mean `{}`? (there are unfocused, uniform, uniform(stable), \
+             psm, lispsm, tsm, adaptive, adaptive(area), log, lambda=NUMBER)",
             match nearest(name, WARPS) {
                 "lambda=" => "lambda=NUMBER",
                 other => other,

@@ -28,6 +28,14 @@ pub(crate) fn distance(text: &str) -> Result<f64> {
     metres(text.parse().unwrap_or(f64::NAN))
 }
 
+/// An error in pixels per texel.
+pub(crate) fn pixels_per_texel(text: &str) -> Result<f64> {
+    match text.parse() {
+        Ok(p) if p > 0.0 && p <= 1e12 => Ok(p),
+        _ => bail!("must be a positive number of pixels per texel, as in 1"),
+    }
+}
+
 /// An angle in degrees that a picture can have.
 pub(crate) fn field_of_view(text: &str) -> Result<f64> {
     opening(text.parse().unwrap_or(f64::NAN))
@@ -98,6 +106,7 @@ mod tests {
     fn good_values() {
         assert_eq!(vector("-1,2.5,1e3").unwrap(), DVec3::new(-1.0, 2.5, 1e3));
         assert_eq!(distance("0.25").unwrap(), 0.25);
+        assert_eq!(pixels_per_texel("1.5").unwrap(), 1.5);
         assert_eq!(field_of_view("60").unwrap(), 60.0);
         assert_eq!(picture_size("960x540").unwrap(), [960, 540]);
         assert_eq!(share("8/8").unwrap(), Share { index: 8, count: 8 });
@@ -113,6 +122,7 @@ mod tests {
         assert!(direction("0,0,0").is_err());
         for text in ["", "0", "-1", "nan", "inf", "1e13", "1m"] {
             assert!(distance(text).is_err(), "{text}");
+            assert!(pixels_per_texel(text).is_err(), "{text}");
         }
         for text in ["", "0", "180", "-60", "nan"] {
             assert!(field_of_view(text).is_err(), "{text}");

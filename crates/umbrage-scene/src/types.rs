@@ -147,14 +147,24 @@ impl Scene {
         self.meshes.iter().map(|m| m.triangles.len() as u64).sum()
     }
 
+    /// A box around each instance, in their order, metres, world space: the mesh's own box, moved.
+    /// Roomy where an instance is turned; [`Aabb::EMPTY`] where its mesh has no triangles.
+    pub fn instance_boxes(&self) -> Vec<Aabb> {
+        let boxes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
+        let moved = |i: &Instance| {
+            let corners = boxes[i.mesh].corners().map(|p| i.world_from_mesh.transform_point3(p));
+            if boxes[i.mesh].is_empty() { Aabb::EMPTY } else { Aabb::around(corners) }
+        };
+        self.instances.iter().map(moved).collect()
+    }
+
     /// The box around everything drawn, metres, world space, exact to rounding; [`Aabb::EMPTY`]
     /// without triangles. Costs a pass over the vertices of every instance that is turned and may
     /// reach beyond those before it.
     pub fn bounds(&self) -> Aabb {
-        let boxes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
         let mut all = Aabb::EMPTY;
-        for i in &self.instances {
-            if boxes[i.mesh].is_empty() {
+        for (i, roomy) in self.instances.iter().zip(self.instance_boxes()) {
+            if all.union(roomy) == all {
                 continue;
             }
             let m = i.world_from_mesh.matrix3;
@@ -163,12 +173,8 @@ impl Scene {
                 .iter()
                 .all(|a| a.to_array().iter().filter(|&&c| c != 0.0).count() == 1);
             let to_world = |p| i.world_from_mesh.transform_point3(p);
-            let loose = Aabb::around(boxes[i.mesh].corners().map(to_world));
-            if all.union(loose) == all {
-                continue;
-            }
             all =
-                all.union(if keeps_axes { loose } else { self.meshes[i.mesh].bounds_in(to_world) });
+                all.union(if keeps_axes { roomy } else { self.meshes[i.mesh].bounds_in(to_world) });
         }
         all
     }

@@ -1,17 +1,22 @@
 use super::filter::{BlurredKind, FilterOption};
+use super::partition::SliceOption;
 use super::*;
 use proptest::prelude::*;
+use umbrage::{Partition, Splits};
 
 #[test]
 fn every_part_is_understood() {
     let spec: Spec =
-        "adaptive(area)+z2+face:csm16(blur=7,attenuation=1,offset)@640x480".parse().unwrap();
+        "adaptive(area)+z2(overlap=0.1,fitted)+face(sides):csm16(blur=7,attenuation=1,offset)@640x480".parse().unwrap();
     assert_eq!(
         spec,
         Spec {
             warp: Warp::Adaptive(Objective::Area),
-            z_partitions: Some(2),
-            face: true,
+            slices: Some(Slices {
+                count: 2,
+                options: vec![SliceOption::Overlap(0.1), SliceOption::Splits(Splits::Fitted)],
+            }),
+            faces: Faces::Sides,
             filter: Some(Filter::Csm(
                 16,
                 vec![FilterOption::Blur(7), FilterOption::Attenuation(1.0), FilterOption::Offset],
@@ -21,6 +26,77 @@ fn every_part_is_understood() {
     );
     assert_eq!("tsm(focus=2.5)".parse::<Spec>().unwrap().warp, Warp::Tsm { focus: Some(2.5) });
     assert_eq!("lambda=11".parse::<Spec>().unwrap().warp, Warp::Lambda(11.0));
+    assert_eq!("uniform(stable)".parse::<Spec>().unwrap().warp, Warp::Stable);
+}
+
+#[test]
+fn partitions_reach_the_planner() {
+    let partition = |text: &str| text.parse::<Technique>().unwrap().options.partition;
+    assert_eq!(partition("uniform"), Partition::default());
+    assert_eq!(partition("uniform+z4"), Partition::slices(4));
+    assert_eq!(
+        partition("uniform+face+z2"),
+        Partition { faces: Faces::SidesAndNear, ..Partition::slices(2) }
+    );
+    assert_eq!(
+        partition("uniform+z4(practical=0.5,overlap=0.25)+face(sides)"),
+        Partition { slices: 4, splits: Splits::Practical(0.5), overlap: 0.25, faces: Faces::Sides }
+    );
+    assert_eq!(partition("uniform+z3(fitted)").splits, Splits::Fitted);
+    let Splits::At(distances) = partition("uniform+z4(at=5/20/60.5)").splits else {
+        panic!("told distances")
+    };
+    assert_eq!(distances[..3], [5.0, 20.0, 60.5]);
+}
+
+/// What the planner refuses names the part of the specification that is to blame.
+#[test]
+fn the_planners_complaints_name_the_part() {
+    let camera = umbrage::Camera::look_at(umbrage::LookAt {
+        eye: glam::DVec3::ZERO,
+        target: glam::DVec3::NEG_Z,
+        up: glam::DVec3::Y,
+        fov_y_rad: 1.0,
+        near: 1.0,
+        far: 100.0,
+        image: [640, 480],
+    });
+    let sun = umbrage::Light::Directional { direction: glam::DVec3::NEG_Y };
+    let mut planner = umbrage::Planner::new();
+    let mut complaint = |technique: &Technique| {
+        let bounds = umbrage::Bounds::default();
+        let plan = planner.plan(camera.as_ref().unwrap(), &[sun], &bounds, &technique.options);
+        technique.error(&plan.unwrap_err()).to_string()
+    };
+    for (text, expected) in [
+        (
+            "uniform(stable)+face",
+            "--shadows uniform(stable)+face: `+face`: stable maps do not turn",
+        ),
+        ("uniform(stable)+z2(fitted)", "`+z2(fitted)`: stable maps cannot be fitted"),
+        ("uniform(stable)@1x1", "`@1x1`: a stable map needs at least 2 texels"),
+        ("uniform+z16@3", "`@3`: a budget of 9 texels is too small for 16 maps"),
+        ("uniform+z2(at=1e-13)", "`+z2(at=0.0000000000001)`: must be 1 ascending distances"),
+    ] {
+        let error = complaint(&text.parse().unwrap());
+        assert!(error.contains(expected), "{text}: {error}");
+    }
+    let mut greedy: Technique = "uniform".parse().unwrap();
+    greedy.limit_error(1e-9);
+    let error = complaint(&greedy);
+    assert!(error.contains("uniform: `--max-error 0.000000001`: so small an error"), "{error}");
+}
+
+#[test]
+fn a_largest_error_yields_to_texels() {
+    let with = |text: &str| {
+        let mut technique: Technique = text.parse().unwrap();
+        technique.limit_error(0.5);
+        technique.options.size
+    };
+    assert_eq!(with("lispsm+z4"), Size::MaxError(0.5));
+    assert_eq!(with("lispsm@512"), Size::Budget(512 * 512));
+    assert_eq!(with("lispsm@64x32"), Size::Exact([64, 32]));
 }
 
 #[test]
@@ -47,7 +123,9 @@ fn bad_specifications_say_what_would_be_right() {
         ("lambda=-1", "positive"),
         ("lambda=NaN", "positive"),
         ("adaptive(volume)", "did you mean `adaptive(area)`?"),
-        ("uniform(area)", "`uniform` takes no options"),
+        ("psm(area)", "`psm` takes no options"),
+        ("uniform(area)", "did you mean `uniform(stable)`?"),
+        ("uniform(stabel)", "did you mean `uniform(stable)`?"),
         ("tsm(fokus=3)", "did you mean `focus=METRES`?"),
         ("tsm(focus=0)", "positive"),
         ("tsm(focus=inf)", "finite"),
@@ -60,6 +138,33 @@ fn bad_specifications_say_what_would_be_right() {
         ("uniform+z17", "from 1 to 16"),
         ("uniform+z99999999999999", "from 1 to 16"),
         ("uniform+z2+z3", "given once"),
+        ("uniform+face+face(sides)", "given once"),
+        ("uniform+face(near)", "did you mean `+face(sides)`?"),
+        ("uniform+face()", "did you mean `+face(sides)`?"),
+        ("uniform+face(sides", "`)`"),
+        ("uniform+z4()", "unknown option `` of `+z4`"),
+        ("uniform+z4(fited)", "did you mean `fitted`?"),
+        ("uniform+z4(fitted=1)", "must be written `fitted`"),
+        ("uniform+z4(practicle=1)", "did you mean `practical=BLEND`?"),
+        ("uniform+z4(practical)", "must be written `practical=BLEND`"),
+        ("uniform+z4(practical=2)", "from 0 to 1"),
+        ("uniform+z4(practical=x)", "from 0 to 1"),
+        ("uniform+z4(overlap=-0.1)", "from 0 to 1"),
+        ("uniform+z4(overlap=NaN)", "from 0 to 1"),
+        ("uniform+z4(overlap=0,overlap=1)", "given once"),
+        ("uniform+z4(fitted,practical=1)", "can be said once"),
+        ("uniform+z4(at=5/20)", "3 ascending numbers of metres"),
+        ("uniform+z4(at=5/20/60/90)", "as in `at=5/10/15`"),
+        ("uniform+z4(at=5/60/20)", "ascending"),
+        ("uniform+z4(at=5/5/20)", "ascending"),
+        ("uniform+z4(at=0/5/20)", "ascending"),
+        ("uniform+z4(at=5//20)", "ascending"),
+        ("uniform+z4(at=5/20/inf)", "ascending"),
+        ("uniform+z2(at=NaN)", "1 ascending number of metres"),
+        ("uniform+z2(at)", "must be written `at=METRES/METRES`"),
+        ("uniform+z4(at=5,20,60)", "3 ascending"),
+        ("uniform+z1(at=5)", "`+z2` or more"),
+        ("uniform+z4(stable)", "unknown option `stable` of `+z4`"),
         ("uniform:", "unknown filter ``"),
         ("uniform:pfc3", "did you mean `pcfN`?"),
         ("uniform:pcf", "needs a number"),
@@ -91,14 +196,7 @@ fn bad_specifications_say_what_would_be_right() {
 
 #[test]
 fn what_is_not_built_yet_says_so() {
-    for text in [
-        "lispsm+z4",
-        "uniform+face",
-        "uniform:vsm",
-        "uniform:csm8",
-        "uniform:pcss",
-        "uniform:evsm(blur=5)",
-    ] {
+    for text in ["uniform:vsm", "uniform:csm8", "uniform:pcss", "uniform:evsm(blur=5)"] {
         let error = text.parse::<Technique>().unwrap_err().to_string();
         assert!(error.contains("not available in this version"), "{text}: {error}");
     }
@@ -111,6 +209,7 @@ fn positive() -> impl Strategy<Value = f64> {
 fn warp() -> impl Strategy<Value = Warp> {
     prop_oneof![
         Just(Warp::Unfocused),
+        Just(Warp::Stable),
         Just(Warp::Uniform),
         Just(Warp::Psm),
         Just(Warp::Lispsm),
@@ -147,6 +246,42 @@ fn filter() -> impl Strategy<Value = Filter> {
     ]
 }
 
+fn slices() -> impl Strategy<Value = Slices> {
+    let share = prop_oneof![0.0..=1.0f64, Just(0.0), Just(1.0), Just(1e-300)];
+    (
+        1u32..=16,
+        share.clone(),
+        share,
+        0..3,
+        any::<bool>(),
+        proptest::collection::vec(positive(), 15),
+    )
+        .prop_map(|(count, blend, overlap, splits, first, mut distances)| {
+            distances.sort_by(f64::total_cmp);
+            distances.dedup();
+            let used = count as usize - 1;
+            let splits = match splits {
+                0 => Splits::Fitted,
+                1 if (1..=distances.len()).contains(&used) => {
+                    distances.truncate(used);
+                    distances.resize(15, 0.0);
+                    Splits::At(distances.try_into().unwrap())
+                }
+                _ => Splits::Practical(blend),
+            };
+            let mut options = vec![SliceOption::Splits(splits), SliceOption::Overlap(overlap)];
+            if first {
+                options.reverse();
+            }
+            options.truncate((blend * 4.0) as usize);
+            Slices { count, options }
+        })
+}
+
+fn faces() -> impl Strategy<Value = Faces> {
+    prop_oneof![Just(Faces::Whole), Just(Faces::SidesAndNear), Just(Faces::Sides)]
+}
+
 fn size() -> impl Strategy<Value = TexelSize> {
     let side = 1..=MAX_SIDE;
     prop_oneof![
@@ -158,12 +293,12 @@ fn size() -> impl Strategy<Value = TexelSize> {
 prop_compose! {
     fn spec()(
         warp in warp(),
-        z_partitions in proptest::option::of(1u32..=16),
-        face in any::<bool>(),
+        slices in proptest::option::of(slices()),
+        faces in faces(),
         filter in proptest::option::of(filter()),
         size in proptest::option::of(size()),
     ) -> Spec {
-        Spec { warp, z_partitions, face, filter, size }
+        Spec { warp, slices, faces, filter, size }
     }
 }
 
@@ -177,7 +312,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_panics(text in "\\PC*", parts in "[a-z0-9()=,.+:@x-]{0,30}") {
+    fn no_text_panics(text in "\\PC*", parts in "[a-z0-9()=,.+:@x/-]{0,30}") {
         for text in [text, parts] {
             if let Ok(spec) = text.parse::<Spec>() {
                 prop_assert_eq!(spec.to_string().parse::<Spec>().unwrap(), spec);

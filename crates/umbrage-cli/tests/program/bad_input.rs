@@ -76,8 +76,24 @@ fn shared_options() {
         (&["--shadows", "uniform@99999"], "from 1 to 16384"),
         (&["--shadows", "uniform:pcf99"], "from 1 to 15"),
         (&["--shadows", "lambda=-2"], "positive"),
-        (&["--shadows", "lispsm+z4"], "not available in this version"),
-        (&["--shadows", "lispsm+face"], "not available in this version"),
+        (&["--shadows", "lispsm+z17"], "from 1 to 16"),
+        (&["--shadows", "lispsm+z4(fited)"], "did you mean `fitted`?"),
+        (&["--shadows", "lispsm+z4(at=5/20)"], "3 ascending numbers of metres"),
+        (&["--shadows", "lispsm+face(top)"], "did you mean `+face(sides)`?"),
+        (&["--shadows", "uniform(stable)+face"], "`+face`: stable maps do not turn with the view"),
+        (
+            &["--shadows", "uniform(stable)+z3(fitted)"],
+            "`+z3(fitted)`: stable maps cannot be fitted",
+        ),
+        (&["--shadows", "uniform+z4@1"], "`@1`: a budget of 1 texels is too small for 4 maps"),
+        (&["--max-error", "0"], "positive number of pixels per texel"),
+        (&["--max-error", "-1"], "positive number of pixels per texel"),
+        (&["--max-error", "NaN"], "positive number of pixels per texel"),
+        (&["--max-error", "1e-9", "--shadows", "psm"], "psm: `--max-error 0.000000001`: so small"),
+        (
+            &["--max-error", "1", "--shadows", "psm@512"],
+            "--max-error: `psm@512` says how many texels",
+        ),
         (&["--shadows", "lispsm:vsm"], "not available in this version"),
         (&["--shadows", "lispsm:csm8(blur=7,offset)"], "not available in this version"),
         (&["--shadwos", "uniform"], "'--shadwos'"),
@@ -114,6 +130,23 @@ fn options_of_some_commands() {
             &["render", "pole", "-o", "p.png", "--shadows", "psm", "--shadows", "tsm"],
             "cannot be used multiple times",
         ),
+        (
+            &["render", "stage.gltf", "-o", "p.png", "--light", "noon", "--light", "torch"],
+            "cannot be used multiple times",
+        ),
+        (
+            &["compare", "stage.gltf", "-o", "r", "--light", "noon", "--light", "torch"],
+            "cannot be used multiple times",
+        ),
+        (
+            &["plan", "stage.gltf", "--light", "noon", "--light", "noon"],
+            "--light: `noon` is given twice",
+        ),
+        (
+            &["plan", "stage.gltf", "--light", "noon", "--light", "moon"],
+            "the scene has no light `moon`",
+        ),
+        (&["plan", "stage.gltf", "--light", "noon", "--sun", "0,-1,0"], "cannot be used with"),
         (&["plan"], "--eye is needed"),
         (&["plan", "--eye", "0,0,0"], "--target is needed"),
         (&["plan", "--eye", "0,0,0", "--target", "0,0,1", "--far", "9"], "--near is needed"),
@@ -229,9 +262,18 @@ fn no_argument_panics() {
         "((((",
         "\t\n",
     ];
-    for option in
-        ["--eye", "--up", "--fov", "--near", "--size", "--sun", "--light", "--camera", "--shadows"]
-    {
+    for option in [
+        "--eye",
+        "--up",
+        "--fov",
+        "--near",
+        "--size",
+        "--sun",
+        "--light",
+        "--camera",
+        "--shadows",
+        "--max-error",
+    ] {
         for value in odd {
             let run = desk.run(&["plan", "pole", option, value]);
             assert!([0, 1, 2].contains(&run.code), "{option} {value:?}: {}", run.stderr);

@@ -5,6 +5,7 @@ mod compare;
 mod desk;
 mod goldens;
 mod help;
+mod partitions;
 mod plan;
 mod render;
 mod scenes;

@@ -1,6 +1,6 @@
 use crate::desk::{Desk, STAGE_GLTF, keys};
 use glam::{DMat4, DVec3, DVec4, Vec4Swizzles};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const VIEW: [&str; 15] = [
     "plan",
@@ -32,12 +32,40 @@ fn matrix(map: &Value) -> DMat4 {
 #[test]
 fn json_has_the_documented_shape() {
     let plan = plan("lispsm@1024");
-    assert_eq!(keys(&plan), ["maps", "storage_factor", "texels", "theta_deg"]);
+    assert_eq!(
+        keys(&plan),
+        [
+            "atlas",
+            "casters_culled",
+            "layers",
+            "lights",
+            "maps",
+            "storage_factor",
+            "texels",
+            "theta_deg"
+        ]
+    );
     let map = &plan["maps"][0];
-    assert_eq!(keys(map), ["error", "face", "lambda", "resolution", "split", "world_to_shadow"]);
+    assert_eq!(
+        keys(map),
+        [
+            "casters",
+            "empty",
+            "error",
+            "face",
+            "lambda",
+            "light",
+            "rect",
+            "resolution",
+            "side",
+            "slice",
+            "split",
+            "world_to_shadow"
+        ]
+    );
     assert_eq!(keys(&map["error"]), ["max", "max_s", "max_t"]);
     assert_eq!(map["face"], Value::Null);
-    assert_eq!(map["split"], serde_json::json!([0.1, 500.0]));
+    assert_eq!(map["split"], json!([0.1, 500.0]));
     let [w, h]: [u64; 2] = serde_json::from_value(map["resolution"].clone()).unwrap();
     assert_eq!(plan["texels"], w * h);
     assert!((1024 * 1000..=1024 * 1024).contains(&(w * h)), "{w}x{h}");
@@ -45,6 +73,19 @@ fn json_has_the_documented_shape() {
     // View along −z, light (0.3, −1, 0.2): the angle between them.
     let expected = (-0.2 / DVec3::new(0.3, -1.0, 0.2).length()).acos().to_degrees();
     assert!((plan["theta_deg"].as_f64().unwrap() - expected).abs() < 1e-9);
+    // What there is for one map without a scene.
+    let theta = &plan["theta_deg"];
+    assert_eq!(plan["lights"], json!([{"name": null, "theta_deg": theta, "maps": [0, 1]}]));
+    assert_eq!(plan["atlas"], json!({"size": [w, h], "gutter": 0}));
+    assert_eq!(plan["layers"], json!({"size": [w, h], "count": 1}));
+    assert_eq!(map["rect"], json!([0, 0, w, h]));
+    assert_eq!(
+        (&map["slice"], &map["light"], &map["empty"]),
+        (&json!(0), &json!(0), &json!(false))
+    );
+    for nothing in [&map["side"], &map["casters"], &plan["casters_culled"]] {
+        assert_eq!(*nothing, Value::Null);
+    }
 }
 
 #[test]
@@ -85,7 +126,7 @@ fn lambda_is_null_without_a_warp_and_kept_as_told() {
 #[test]
 fn exact_sizes_are_kept() {
     let plan = plan("tsm@640x480");
-    assert_eq!(plan["maps"][0]["resolution"], serde_json::json!([640, 480]));
+    assert_eq!(plan["maps"][0]["resolution"], json!([640, 480]));
     assert_eq!(plan["texels"], 640 * 480);
 }
 
@@ -199,7 +240,7 @@ fn looking_away_from_everything_gives_an_empty_map() {
     ];
     let plan = desk.json(&[&away[..], &["--json"]].concat());
     assert_eq!(plan["texels"], 0);
-    assert_eq!(plan["maps"][0]["resolution"], serde_json::json!([0, 0]));
+    assert_eq!(plan["maps"][0]["resolution"], json!([0, 0]));
     assert!(desk.succeed(&away).contains("empty: nothing lit between 1 and 100 metres"));
     let json = desk.run(&[&away[..], &["--json"]].concat());
     assert!(json.stderr.contains("nothing lit between 1 and 100 metres"), "{}", json.stderr);
