@@ -75,23 +75,28 @@ impl Aabb {
 
 /// Where shadows are cast from and received. Tighter bounds give finer shadows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bounds {
+pub struct Bounds<'a> {
     /// Everything that receives shadows; `None` if unknown: the whole view frustum is served.
     pub receivers: Option<Aabb>,
+    /// Boxes that hold all of the receivers between them, if more is known than one box around all; they may
+    /// overlap. Empty: all of `receivers`. Where one box would be full of air, some dozens of boxes
+    /// spare the maps what nobody sees: one for each object, say. Planning takes time in proportion.
+    pub receiver_parts: &'a [Aabb],
     /// Everything that casts shadows; `None` if unknown: casters may lie anywhere towards the light.
     /// Only [`Warp::Unfocused`](crate::Warp::Unfocused) has to cover it. Other maps need not: what lies
     /// between the receivers and the light is clamped to depth 0.
     pub casters: Option<Aabb>,
 }
 
-impl Bounds {
+impl Bounds<'_> {
     /// One box that holds both receivers and casters.
     pub fn of_scene(scene: Aabb) -> Self {
-        Self { receivers: Some(scene), casters: Some(scene) }
+        Self { receivers: Some(scene), receiver_parts: &[], casters: Some(scene) }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.receivers.map_or(Ok(()), |b| b.check("bounds.receivers"))?;
+        self.receiver_parts.iter().try_for_each(|b| b.check("bounds.receiver_parts"))?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
     }
 }

@@ -1,16 +1,20 @@
 //! What can cast into a map.
 
 use crate::bounds::Plane;
-use crate::focus::ConvexBody;
+use crate::focus::Body;
 use crate::warp::LightSpace;
 use glam::{DVec2, DVec3};
 
-/// Planes around all that can cast onto `body`: the body swept towards the light. Those of its
-/// faces that look away from the light, and one through every edge of its outline seen from the
-/// light.
+/// How near a plane must come to a body to bound it, as a share of the body's size.
+const TOUCH: f64 = 1e-6;
+
+/// Planes around all that can cast onto `body`: the body swept towards the light. Those of the planes
+/// `around` it that look away from the light and touch it, and one through every edge of its outline seen
+/// from the light.
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
-    body: &ConvexBody,
+    around: impl Iterator<Item = Plane>,
+    body: &Body,
     space: &LightSpace,
     outline: &mut Vec<DVec2>,
 ) {
@@ -21,7 +25,8 @@ pub(crate) fn caster_planes(
         Some(apex) => plane.distance(apex) >= 0.0,
     };
     let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
-    planes.extend(body.planes().filter(sweeps_inwards).map(widen));
+    let touches = |p: &Plane| body.vertices().iter().any(|&v| p.distance(v) <= TOUCH * body.size());
+    planes.extend(around.filter(sweeps_inwards).filter(touches).map(widen));
     convex_outline(outline, body.vertices().iter().map(|&v| space.project(v).0));
     for (i, &a) in outline.iter().enumerate() {
         let b = outline[(i + 1) % outline.len()];

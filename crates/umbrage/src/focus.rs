@@ -1,14 +1,14 @@
-//! The convex body B of what the camera sees (Wimmer et al. 2004, §3.3), in local space.
+//! The body B of what the camera sees (Wimmer et al. 2004, §3.3), in local space.
 
 use crate::bounds::{Aabb, Plane};
 use crate::camera::Camera;
 use crate::math::range;
 use glam::DVec3;
 
-/// A convex polyhedron as vertices and faces, cut down by planes. Its buffers are kept from frame
-/// to frame.
+/// Convex polyhedra as vertices and faces, all cut down by the same planes: one around everything seen, or
+/// one for each box of receivers. Its buffers are kept from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct ConvexBody {
+pub(crate) struct Body {
     vertices: Vec<DVec3>,
     faces: Vec<Face>,
     /// Vertex indices of all faces, one loop after the other, counter-clockwise from outside.
@@ -39,7 +39,7 @@ struct Scratch {
     loops: Vec<u32>,
 }
 
-impl ConvexBody {
+impl Body {
     /// Starts over with the camera's frustum, relative to the eye.
     pub(crate) fn set_frustum(&mut self, camera: &Camera) {
         self.clear();
@@ -62,6 +62,14 @@ impl ConvexBody {
         self.vertices.clone_from(&other.vertices);
         self.faces.clone_from(&other.faces);
         self.loops.clone_from(&other.loops);
+    }
+
+    /// Adds all of another body's polyhedra.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let (vertices, start) = (self.vertices.len() as u32, self.loops.len());
+        self.vertices.extend_from_slice(&other.vertices);
+        self.loops.extend(other.loops.iter().map(|i| i + vertices));
+        self.faces.extend(other.faces.iter().map(|f| Face { start: f.start + start, ..*f }));
     }
 
     pub(crate) fn clear(&mut self) {
@@ -130,14 +138,23 @@ impl ConvexBody {
             self.clear();
             return;
         }
+        self.sides(aabb).into_iter().for_each(|side| self.clip(side));
+    }
+
+    /// The planes around a box, as far as this body is concerned.
+    pub(crate) fn sides(&self, aabb: Aabb) -> [Plane; 6] {
         // A flat box, a ground plane say, gets a thickness far below what single precision
         // resolves at its distance, so that the body keeps an inside.
         let farthest = aabb.min.abs().max(aabb.max.abs()).max_element();
         let pad = 1e-7 * farthest.min(self.size());
-        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-            self.clip(Plane { normal: axis, offset: pad - axis.dot(aabb.min) });
-            self.clip(Plane { normal: -axis, offset: pad + axis.dot(aabb.max) });
-        }
+        std::array::from_fn(|i| {
+            let axis = DVec3::AXES[i / 2];
+            if i % 2 == 0 {
+                Plane { normal: axis, offset: pad - axis.dot(aabb.min) }
+            } else {
+                Plane { normal: -axis, offset: pad + axis.dot(aabb.max) }
+            }
+        })
     }
 
     /// Cuts off what lies outside `plane`.
@@ -211,13 +228,14 @@ impl ConvexBody {
                 }
             }
         }
-        if let Some(&(first, mut at)) = rim.first() {
+        // One new face for each polyhedron that was cut.
+        while let Some((first, mut at)) = rim.pop() {
             let start = loops.len();
             loops.push(first);
-            while at != first && loops.len() - start < rim.len() {
+            while at != first {
                 loops.push(at);
-                match rim.iter().find(|edge| edge.0 == at) {
-                    Some(edge) => at = edge.1,
+                match rim.iter().position(|edge| edge.0 == at) {
+                    Some(next) => at = rim.swap_remove(next).1,
                     None => break,
                 }
             }
@@ -293,7 +311,7 @@ mod tests {
             cuts in proptest::collection::vec(plane(), 0..8),
             floor in proptest::option::of(-2.0..2.0f64),
         ) {
-            let mut body = ConvexBody::default();
+            let mut body = Body::default();
             body.set_frustum(&camera());
             let mut planes: Vec<Plane> = body.planes().collect();
             // Sometimes all that is left is a floor of hardly any thickness.
@@ -321,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_flat_box_keeps_its_floor() {
-        let mut body = ConvexBody::default();
+        let mut body = Body::default();
         body.set_frustum(&camera());
         body.clip_aabb(Aabb::new(DVec3::new(-50.0, -1.0, -50.0), DVec3::new(50.0, -1.0, 50.0)));
         assert!(body.vertices().len() >= 6);
@@ -330,7 +348,7 @@ mod tests {
 
     #[test]
     fn a_box_out_of_sight_leaves_nothing() {
-        let mut body = ConvexBody::default();
+        let mut body = Body::default();
         for aabb in [Aabb::new(DVec3::splat(30.0), DVec3::splat(31.0)), Aabb::EMPTY] {
             body.set_frustum(&camera());
             body.clip_aabb(aabb);

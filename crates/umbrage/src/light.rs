@@ -151,6 +151,9 @@ pub(crate) enum Lamp {
     },
 }
 
+/// Shares of a coordinate below this are lost in clipping.
+const ROUNDING: f64 = 1e-11;
+
 impl Lamp {
     /// The way it shines, and the position of a pyramid's apex relative to `origin` (world space).
     pub(crate) fn direction_and_apex(&self, origin: DVec3) -> (DVec3, Option<DVec3>) {
@@ -161,8 +164,9 @@ impl Lamp {
     }
 
     /// The four sides of a pyramid, then its near and far end, relative to `origin` (world space); none
-    /// for directional lights.
-    pub(crate) fn frustum(&self, origin: DVec3) -> Option<[Plane; 6]> {
+    /// for directional lights. The near end is far enough from the apex to be told from it among
+    /// coordinates as large as `size`, metres: at the apex itself there is no map.
+    pub(crate) fn frustum(&self, origin: DVec3, size: f64) -> Option<[Plane; 6]> {
         let Self::Pyramid { position, direction: axis, slope, near, range } = *self else {
             return None;
         };
@@ -174,7 +178,7 @@ impl Lamp {
             side(-a),
             side(b),
             side(-b),
-            Plane::through(apex + axis * near, axis),
+            Plane::through(apex + axis * near.max(ROUNDING * apex.length().max(size)), axis),
             Plane::through(apex + axis * range, -axis),
         ])
     }

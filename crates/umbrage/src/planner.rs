@@ -1,10 +1,10 @@
 use crate::aliasing::Local;
-use crate::bounds::{Bounds, Plane};
+use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::casters::caster_planes;
 use crate::error::Error;
 use crate::fit::{DepthRange, fit, lambda, matrices};
-use crate::focus::ConvexBody;
+use crate::focus::Body;
 use crate::light::{Lamp, Light};
 use crate::math::range;
 use crate::options::{Faces, Objective, Options, Size, Warp};
@@ -26,6 +26,8 @@ pub struct Planner {
     units: Vec<[f64; 2]>,
     sizes: Vec<[u32; 2]>,
     bodies: Bodies,
+    /// Planes around all that the camera sees.
+    around: Vec<Plane>,
     /// Planes around the part of a light's view that a face is for.
     cell: Vec<Plane>,
     /// A map that is only tried.
@@ -37,7 +39,7 @@ pub struct Planner {
 #[derive(Clone, Debug, Default)]
 struct Draft {
     /// What the map serves.
-    body: ConvexBody,
+    body: Body,
     /// Where the map stands, if that depends on its resolution.
     still: Option<Still>,
 }
@@ -46,13 +48,13 @@ struct Draft {
 #[derive(Clone, Debug, Default)]
 struct Bodies {
     /// By the camera, of the receivers.
-    view: ConvexBody,
+    view: Body,
     /// In a light.
-    lit: ConvexBody,
+    lit: Body,
     /// In the part of a face.
-    face: ConvexBody,
+    face: Body,
     /// In a slice that is only tried.
-    slice: ConvexBody,
+    slice: Body,
 }
 
 impl Planner {
@@ -72,7 +74,7 @@ impl Planner {
         &mut self,
         camera: &Camera,
         lights: &[Light],
-        bounds: &Bounds,
+        bounds: &Bounds<'_>,
         options: &Options,
     ) -> Result<&Plan, Error> {
         options.check()?;
@@ -80,11 +82,7 @@ impl Planner {
         self.plan.origin = camera.eye();
         self.plan.lights.clear();
         self.units.clear();
-        let view = &mut self.bodies.view;
-        view.set_frustum(camera);
-        if let Some(receivers) = bounds.receivers {
-            view.clip_aabb(receivers.relative_to(camera.eye()));
-        }
+        self.focus(camera, bounds);
         for (index, light) in lights.iter().enumerate() {
             let light = light.checked()?;
             let first = self.units.len();
@@ -104,11 +102,33 @@ impl Planner {
         Ok(plan)
     }
 
+    /// Finds what the camera sees of the receivers.
+    fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
+        let Bodies { view, lit: whole, slice: part, .. } = &mut self.bodies;
+        let local = |aabb: Aabb| aabb.relative_to(camera.eye());
+        view.set_frustum(camera);
+        self.around.clear();
+        self.around.extend(view.planes());
+        if let Some(receivers) = bounds.receivers {
+            self.around.extend(view.sides(local(receivers)));
+            view.clip_aabb(local(receivers));
+        }
+        if !bounds.receiver_parts.is_empty() {
+            whole.copy_from(view);
+            view.clear();
+            for &aabb in bounds.receiver_parts {
+                part.copy_from(whole);
+                part.clip_aabb(local(aabb));
+                view.append(part);
+            }
+        }
+    }
+
     /// Appends the maps of one lamp, all but their resolutions and what follows from them.
     fn draft_lamp(&mut self, part: Part, request: &Request<'_>) {
         let Request { camera, lamp, options, .. } = *request;
-        let pyramid = lamp.frustum(camera.eye());
         let Bodies { view, lit, .. } = &mut self.bodies;
+        let pyramid = lamp.frustum(camera.eye(), view.size());
         lit.copy_from(view);
         pyramid.into_iter().flatten().for_each(|plane| lit.clip(plane));
         let with_near = options.partition.faces == Faces::SidesAndNear;
@@ -190,7 +210,10 @@ impl Planner {
                 Some(still) => still.unit_errors(),
             };
             self.units.push(unit);
-            self.scratch.caster_planes(map, &draft.body, request);
+            let around = self.around.iter().chain(&map.cell).copied();
+            let space = LightSpace::fixed(request.lamp, camera);
+            let outline = &mut self.scratch.outline;
+            caster_planes(&mut map.caster_planes, around, &draft.body, &space, outline);
         }
     }
 
@@ -206,7 +229,7 @@ impl Planner {
 struct Request<'a> {
     camera: &'a Camera,
     lamp: &'a Lamp,
-    bounds: &'a Bounds,
+    bounds: &'a Bounds<'a>,
     options: &'a Options,
 }
 
@@ -239,7 +262,7 @@ impl Scratch {
     fn draft(
         &mut self,
         map: &mut ShadowMap,
-        body: &ConvexBody,
+        body: &Body,
         along: &Along,
         warp: Warp,
         request: &Request<'_>,
@@ -313,11 +336,6 @@ impl Scratch {
         unit_errors(map, body, camera)
     }
 
-    fn caster_planes(&mut self, map: &mut ShadowMap, body: &ConvexBody, request: &Request<'_>) {
-        let space = LightSpace::fixed(request.lamp, request.camera);
-        caster_planes(&mut map.caster_planes, body, &space, &mut self.outline);
-    }
-
     /// Gives a map its resolution and all that follows from it.
     fn finish(
         &mut self,
@@ -387,7 +405,7 @@ impl ShadowMap {
 }
 
 /// Largest m_s and m_t of a map at the body's vertices.
-fn unit_errors(map: &ShadowMap, body: &ConvexBody, camera: &Camera) -> [f64; 2] {
+fn unit_errors(map: &ShadowMap, body: &Body, camera: &Camera) -> [f64; 2] {
     let pixel = camera.pixel_width_per_depth();
     body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
         [0.0f64; 2],

@@ -1,4 +1,4 @@
-//! Largest errors of a map over a convex body, to a known tolerance.
+//! Largest errors of a map over a body, to a known tolerance.
 //!
 //! With A the footprint (metres per texel), w the projection's fourth coordinate and z the view depth,
 //! A = w·B, where B is affine in the point for parallel light, and an affine matrix over the
@@ -15,7 +15,7 @@
 
 use crate::aliasing::Local;
 use crate::camera::Camera;
-use crate::focus::ConvexBody;
+use crate::focus::Body;
 use crate::plan::{MapError, Rows, ShadowMap};
 use glam::DVec3;
 use std::cmp::Ordering;
@@ -85,7 +85,7 @@ pub(crate) struct Scratch {
 /// maximum, and at most one per cent more in all but extreme views.
 pub(crate) fn worst_errors(
     map: &ShadowMap,
-    body: &ConvexBody,
+    body: &Body,
     camera: &Camera,
     scratch: &mut Scratch,
 ) -> MapError {

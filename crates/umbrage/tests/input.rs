@@ -142,7 +142,7 @@ fn odd_input_gives_sound_plans() {
         Bounds::of_scene(point),
         Bounds::of_scene(behind),
         Bounds::of_scene(Aabb::EMPTY),
-        Bounds { receivers: None, casters: Some(floor) },
+        Bounds { receivers: None, casters: Some(floor), ..Bounds::default() },
     ];
     let mut planner = Planner::new();
     for look in views {

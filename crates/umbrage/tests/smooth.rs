@@ -51,7 +51,7 @@ const MOTIONS: [Motion; 5] = [
     }),
 ];
 
-fn bounds() -> [(&'static str, Bounds); 3] {
+fn bounds() -> [(&'static str, Bounds<'static>); 3] {
     let floor = Aabb::new(DVec3::new(-40.0, 0.0, -40.0), DVec3::new(40.0, 0.0, 40.0));
     let hall = Aabb::new(DVec3::new(-30.0, 0.0, -60.0), DVec3::new(25.0, 12.0, 30.0));
     [

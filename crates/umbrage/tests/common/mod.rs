@@ -27,7 +27,7 @@ pub(crate) const WARPS: [(&str, Warp); 11] = [
 pub(crate) struct Config {
     pub camera: Camera,
     pub light: Light,
-    pub bounds: Bounds,
+    pub bounds: Bounds<'static>,
 }
 
 pub(crate) fn options(warp: Warp) -> Options {
@@ -170,7 +170,7 @@ pub(crate) fn config() -> impl Strategy<Value = Config> {
         (Just(camera), light, receivers).prop_map(|(camera, light, receivers)| Config {
             camera,
             light,
-            bounds: Bounds { receivers, casters: receivers },
+            bounds: Bounds { receivers, casters: receivers, ..Bounds::default() },
         })
     })
 }
