@@ -115,8 +115,6 @@ pub(crate) struct Compare {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
-    #[command(flatten)]
-    pub(crate) texels: TexelArgs,
     /// Print report.json to standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -242,6 +240,8 @@ pub(crate) struct ComparisonArgs {
         default_values = DEFAULT_TECHNIQUES
     )]
     pub(crate) shadows: Vec<Technique>,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
     /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
     /// comparisons use 1.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
@@ -313,7 +313,7 @@ pub(crate) struct TexelArgs {
     /// Take the fewest texels with which none gets wider than PX pixels, before any surface's slope, in
     /// place of @TEXELS.
     #[arg(long, value_name = "PX", value_parser = values::pixels_per_texel, allow_hyphen_values = true)]
-    max_error: Option<f64>,
+    pub(crate) max_error: Option<f64>,
 }
 
 /// What does the work.
@@ -425,7 +425,6 @@ pub(crate) enum PictureKind {
 
 impl Compare {
     fn check(&mut self) -> Result<()> {
-        self.texels.apply(&mut self.comparison.shadows)?;
         self.view.check()?;
         self.light.check()?;
         self.comparison.check()
@@ -433,7 +432,8 @@ impl Compare {
 }
 
 impl ComparisonArgs {
-    fn check(&self) -> Result<()> {
+    fn check(&mut self) -> Result<()> {
+        self.texels.apply(&mut self.shadows)?;
         self.execution.check()?;
         for (i, technique) in self.shadows.iter().enumerate() {
             let is_new = !self.shadows[..i].contains(technique);

@@ -35,6 +35,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
     }
     let settings = SweepSettings {
         shadows: args.comparison.shadows.iter().map(|t| t.spec.to_string()).collect(),
+        max_error: args.comparison.texels.max_error,
         size: args.size,
         samples: args.comparison.samples,
         opaque: args.opaque,

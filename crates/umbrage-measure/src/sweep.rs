@@ -17,11 +17,13 @@ pub struct Sweep {
 }
 
 /// What all views of a sweep have in common.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepSettings {
     /// The shadow specifications.
     pub shadows: Vec<String>,
+    /// Pixels per texel at most, where a specification says nothing of texels; `None`: the default budget.
+    pub max_error: Option<f64>,
     /// Width and height of the pictures, pixels, where a view has none of its own.
     pub size: [u32; 2],
     /// Rays along each side of a pixel.
@@ -312,6 +314,7 @@ pub(crate) mod tests {
             share: None,
             settings: SweepSettings {
                 shadows: (0..n).map(|i| format!("lambda={i}@1024")).collect(),
+                max_error: None,
                 size: [64, 48],
                 samples: 4,
                 opaque: true,

@@ -191,6 +191,7 @@ pub(super) fn differences(present: &SweepSettings, wanted: &SweepSettings) -> Ve
     let options = |s: &SweepSettings| {
         [
             ("--shadows", s.shadows.join(" ")),
+            ("--max-error", s.max_error.map_or("off".to_owned(), |pixels| pixels.to_string())),
             ("--size", format!("{}x{}", s.size[0], s.size[1])),
             ("--samples", s.samples.to_string()),
             ("--opaque", if s.opaque { "on" } else { "off" }.to_owned()),

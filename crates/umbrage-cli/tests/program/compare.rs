@@ -179,6 +179,29 @@ fn an_empty_folder_is_taken() {
     assert!(desk.path("report/index.html").is_file());
 }
 
+/// Specifications that say how many texels they have keep them; the others take what the error needs.
+#[test]
+fn a_largest_error_decides_the_texels() {
+    let desk = Desk::new();
+    let compare = "compare pole -o report --shadows uniform@64 --shadows lispsm+z2 --size 96x54 \
+                   --max-error";
+    let texels = |pixels: &str| {
+        let words: Vec<&str> = compare.split_whitespace().chain([pixels, "--json"]).collect();
+        let json = desk.json(&words);
+        let [told, sized] = [0, 1].map(|i| json["results"][i]["texels"].as_u64().unwrap());
+        assert!((4000..=64 * 64).contains(&told), "{told}");
+        assert_eq!(json["results"][1]["maps"], 2);
+        sized
+    };
+    let ratio = texels("2") as f64 / texels("4") as f64;
+    assert!((3.5..4.5).contains(&ratio), "{ratio}");
+    let words: Vec<&str> = compare.split_whitespace().chain(["4"]).collect();
+    let table = desk.succeed(&words);
+    assert!(
+        table.lines().any(|l| l.starts_with("lispsm+z2 ") && l.contains(&texels("4").to_string()))
+    );
+}
+
 #[test]
 fn a_scene_lit_by_a_point_light_compares() {
     let desk = Desk::new();

@@ -164,3 +164,16 @@ fn a_picture_without_anything_to_shadow_says_so() {
     // A picture of no light has nothing to complain about.
     assert!(!says(&["render", "pole", "-o", "sky.png", "--aov", "depth"]));
 }
+
+#[test]
+fn the_texels_that_an_error_takes_are_told() {
+    let desk = Desk::new();
+    let words = "render pole -o p.png --size 96x54 --shadows uniform+z2 --max-error 2";
+    let run = desk.run(&words.split(' ').collect::<Vec<_>>());
+    assert_eq!((run.code, run.stdout.as_str()), (0, ""), "{}", run.stderr);
+    let told = run.stderr.lines().find_map(|l| l.strip_prefix("texels: ")).unwrap();
+    assert!(told.ends_with(" for at most 2 px a texel"), "{told}");
+    let plan = "plan pole --json --size 96x54 --shadows uniform+z2 --max-error 2";
+    let plan = desk.json(&plan.split(' ').collect::<Vec<_>>());
+    assert_eq!(told.split(' ').next().unwrap(), plan["texels"].to_string());
+}

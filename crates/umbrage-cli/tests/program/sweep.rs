@@ -519,6 +519,7 @@ fn a_sweep_of_other_settings_or_views_is_not_mixed_in() {
     for (options, expected) in [
         (&["--samples", "2"][..], "--samples was `1`, is `2`"),
         (&["--opaque"], "--opaque was `off`, is `on`"),
+        (&["--shadows", "psm", "--max-error", "9"], "--max-error was `off`, is `9`"),
         (
             &["--shadows", "psm"],
             "--shadows was `uniform@32 lispsm@64`, is `uniform@32 lispsm@64 psm`",

@@ -214,6 +214,11 @@ fn setup(sweep: &Sweep) -> Vec<(&'static str, String)> {
         ("Truth", rays_a_pixel(settings.samples.pow(2))),
         ("Executed by", settings.backend.clone()),
     ];
+    if let Some(pixels) = settings.max_error {
+        let few =
+            format!("the fewest for at most {pixels} px a texel, where a technique does not say");
+        setup.push(("Texels", few));
+    }
     if settings.opaque {
         setup.push(("Alpha masks", "ignored: masked materials show and cast as solid".to_owned()));
     }

@@ -368,6 +368,7 @@ fn a_sweeps_page_leads_to_its_views() {
         share: None,
         settings: SweepSettings {
             shadows: names.map(str::to_owned).to_vec(),
+            max_error: Some(1.5),
             size: [160, 90],
             samples: 4,
             opaque: true,
