@@ -21,6 +21,10 @@ pub(crate) struct Boxes {
     tree: Bvh2,
 }
 
+/// A node of the tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Node(usize);
+
 impl Boxes {
     /// The tree for primitives with these indices and boxes, none empty. `slack` widens all boxes,
     /// for errors that the caller makes.
@@ -50,6 +54,29 @@ impl Boxes {
         }
         let outermost = Aabb { min: all.min - 2.0 * pad, max: all.max + 2.0 * pad };
         Self { center, outermost, tree }
+    }
+
+    /// The box around all primitives, and how to open it: `None` if there are none.
+    pub(crate) fn root(&self) -> Option<Node> {
+        (!self.tree.nodes.is_empty()).then_some(Node(0))
+    }
+
+    /// A node's box, padding and all.
+    pub(crate) fn aabb(&self, node: Node) -> Aabb {
+        let aabb = self.tree.nodes[node.0].aabb();
+        let corner = |p: Vec3A| p.as_dvec3() + self.center;
+        Aabb { min: corner(aabb.min), max: corner(aabb.max) }
+    }
+
+    /// What is in a node: two smaller ones, or primitives.
+    pub(crate) fn open(&self, node: Node) -> Result<[Node; 2], &[u32]> {
+        let node = &self.tree.nodes[node.0];
+        let first = node.first_index as usize;
+        if node.is_leaf() {
+            Err(&self.tree.primitive_indices[first..first + node.prim_count as usize])
+        } else {
+            Ok([Node(first), Node(first + 1)])
+        }
     }
 
     /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`, roughly

@@ -1,10 +1,12 @@
-use crate::boxes::Boxes;
+use crate::boxes::{Boxes, Node};
 use crate::check::check_mesh;
 use crate::placement::{Placement, stretch};
 use crate::triangle::{ShearedRay, TriangleHit};
 use crate::{Error, Ray};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture};
 
@@ -48,6 +50,43 @@ pub struct Surface {
     /// Linear red, green, blue.
     pub base_color: Vec3,
 }
+
+/// A node of a tree, of those over the instances or of an instance's mesh, on the way to
+/// [`Tracer::boxes`].
+#[derive(Clone, Copy)]
+struct Opened {
+    aabb: Aabb,
+    node: Node,
+    instance: Option<u32>,
+}
+
+impl Opened {
+    /// Half the box's surface: flat boxes have no volume, but are not small.
+    fn surface(&self) -> f64 {
+        let size = self.aabb.size();
+        size.dot(DVec3::new(size.y, size.z, size.x))
+    }
+}
+
+impl Ord for Opened {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.surface().total_cmp(&other.surface())
+    }
+}
+
+impl PartialOrd for Opened {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Opened {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Opened {}
 
 /// A scene, ready for rays.
 ///
@@ -150,6 +189,52 @@ impl<'a> Tracer<'a> {
     /// instances are turned; [`Scene::bounds`] is exact.
     pub fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// At most `limit` boxes that hold everything drawn between them, metres, world space: no single box's
+    /// air. They may overlap.
+    ///
+    /// The largest are opened first, down the trees that rays are traced with.
+    pub fn boxes(&self, limit: usize) -> Vec<Aabb> {
+        let instances = |node| Opened {
+            aabb: self.instances.aabb(node).intersection(self.bounds),
+            node,
+            instance: None,
+        };
+        let within = |instance: u32, node| {
+            let placement = &self.placements[instance as usize];
+            let aabb = placement.bounds(self.meshes[placement.mesh].boxes.aabb(node));
+            Opened { aabb: aabb.intersection(self.bounds), node, instance: Some(instance) }
+        };
+        let mut open: BinaryHeap<Opened> =
+            self.instances.root().map(instances).into_iter().collect();
+        let mut closed = Vec::new();
+        while let Some(largest) = open.pop() {
+            let children: Vec<Opened> = match largest.instance {
+                None => match self.instances.open(largest.node) {
+                    Ok(nodes) => nodes.map(instances).into(),
+                    Err(leaf) => leaf
+                        .iter()
+                        .filter_map(|&i| {
+                            let mesh = self.placements[i as usize].mesh;
+                            Some(within(i, self.meshes[mesh].boxes.root()?))
+                        })
+                        .collect(),
+                },
+                Some(instance) => {
+                    let mesh = self.placements[instance as usize].mesh;
+                    let nodes = self.meshes[mesh].boxes.open(largest.node);
+                    nodes.map_or(Vec::new(), |nodes| nodes.map(|n| within(instance, n)).into())
+                }
+            };
+            let fits = open.len() + closed.len() + children.len() <= limit;
+            if children.is_empty() || !fits {
+                closed.push(largest.aabb);
+            } else {
+                open.extend(children);
+            }
+        }
+        closed
     }
 
     /// The first hit with `range[0] ≤ t < range[1]`; either end may be infinite. Of hits at equal t

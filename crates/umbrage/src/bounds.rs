@@ -29,6 +29,11 @@ impl Aabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// The box of what lies in both; holds no point if they do not meet.
+    pub fn intersection(self, other: Self) -> Self {
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+    }
+
     /// Whether the box holds no point at all.
     pub fn is_empty(self) -> bool {
         self.min.cmpgt(self.max).any()

@@ -18,14 +18,15 @@ pub(crate) fn caster_planes(
     space: &LightSpace,
     outline: &mut Vec<DVec2>,
 ) {
+    let size = body.size();
     // Rounding must never lose a caster.
-    let slack = 1e-9 * body.size();
+    let slack = 1e-9 * size;
     let sweeps_inwards = |plane: &Plane| match space.apex {
         None => plane.normal.dot(space.y.truncate()) >= 0.0,
         Some(apex) => plane.distance(apex) >= 0.0,
     };
     let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
-    let touches = |p: &Plane| body.vertices().iter().any(|&v| p.distance(v) <= TOUCH * body.size());
+    let touches = |p: &Plane| body.vertices().iter().any(|&v| p.distance(v) <= TOUCH * size);
     planes.extend(around.filter(sweeps_inwards).filter(touches).map(widen));
     convex_outline(outline, body.vertices().iter().map(|&v| space.project(v).0));
     for (i, &a) in outline.iter().enumerate() {

@@ -78,6 +78,19 @@ impl Body {
         self.loops.clear();
     }
 
+    /// Starts over with a box (local space), given by its [`sides`](Self::sides).
+    pub(crate) fn set_box(&mut self, sides: [Plane; 6]) {
+        self.clear();
+        let min = DVec3::from([0, 2, 4].map(|i| -sides[i].offset));
+        let max = DVec3::from([1, 3, 5].map(|i| sides[i].offset));
+        self.vertices.extend(Aabb { min, max }.corners());
+        let faces =
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        for (plane, face) in sides.into_iter().zip(faces) {
+            self.push_face(plane, &face);
+        }
+    }
+
     fn push_face(&mut self, plane: Plane, indices: &[u32]) {
         self.faces.push(Face { plane, start: self.loops.len(), len: indices.len() });
         self.loops.extend_from_slice(indices);
@@ -204,7 +217,8 @@ impl Body {
                 let (lo, hi) = (a.min(b), a.max(b));
                 let (d_lo, d_hi) = (distances[lo as usize], distances[hi as usize]);
                 if d_lo * d_hi < 0.0 {
-                    let known = cuts.iter().find(|c| (c.0, c.1) == (lo, hi)).map(|c| c.2);
+                    // Neighbouring faces of a polyhedron lie near each other.
+                    let known = cuts.iter().rev().find(|c| (c.0, c.1) == (lo, hi)).map(|c| c.2);
                     loops.push(known.unwrap_or_else(|| {
                         let index = vertices.len() as u32;
                         let [p, q] = [lo, hi].map(|i| self.vertices[i as usize]);
@@ -234,7 +248,7 @@ impl Body {
             loops.push(first);
             while at != first {
                 loops.push(at);
-                match rim.iter().position(|edge| edge.0 == at) {
+                match rim.iter().rposition(|edge| edge.0 == at) {
                     Some(next) => at = rim.swap_remove(next).1,
                     None => break,
                 }

@@ -117,9 +117,13 @@ impl Planner {
             whole.copy_from(view);
             view.clear();
             for &aabb in bounds.receiver_parts {
-                part.copy_from(whole);
-                part.clip_aabb(local(aabb));
-                view.append(part);
+                let sides = whole.sides(local(aabb));
+                let may_be_seen = |p: &Plane| p.may_touch(local(aabb));
+                if !aabb.is_empty() && self.around.iter().all(may_be_seen) {
+                    part.set_box(sides);
+                    self.around.iter().for_each(|&p| part.clip(p));
+                    view.append(part);
+                }
             }
         }
     }
