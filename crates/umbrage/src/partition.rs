@@ -193,7 +193,8 @@ pub(crate) fn split(
     ends
 }
 
-/// How alike the storage of fitted slices is, as a share.
+/// How alike the storage of fitted slices is, as a share. All but the last one are a thousand times as alike:
+/// each begins where the one before ends, and what is wrong with the first grows along the row.
 const FITTED: f64 = 1e-3;
 
 /// Moves all but the first and last end so that all slices need the same storage.
@@ -219,7 +220,7 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
             ends[i] = if whole <= 0.0 || begin >= f {
                 f
             } else {
-                root(range, [-2.0, whole], FITTED / 4.0, |end| over(begin, end.exp(), allowed))
+                root(range, [-2.0, whole], FITTED / 1000.0, |end| over(begin, end.exp(), allowed))
                     .exp()
             };
         }
