@@ -315,12 +315,16 @@ impl Camera {
         })
     }
 
-    /// The frustum's corners at `depth`, relative to the eye: lower left, lower right, upper
-    /// right, upper left.
-    pub(crate) fn corners_at(&self, depth: f64) -> [DVec3; 4] {
+    /// Slopes, right and up, of the frustum's edges: lower left, lower right, upper right, upper left.
+    pub(crate) fn corner_slopes(&self) -> [DVec2; 4] {
         let (lo, hi) = (self.slope_min, self.slope_max);
-        [(lo.x, lo.y), (hi.x, lo.y), (hi.x, hi.y), (lo.x, hi.y)]
-            .map(|(x, y)| (self.right * x + self.up * y + self.forward) * depth)
+        [lo, DVec2::new(hi.x, lo.y), hi, DVec2::new(lo.x, hi.y)]
+    }
+
+    /// The frustum's corners at `depth`, relative to the eye, in the order of their slopes.
+    pub(crate) fn corners_at(&self, depth: f64) -> [DVec3; 4] {
+        self.corner_slopes()
+            .map(|slope| (self.right * slope.x + self.up * slope.y + self.forward) * depth)
     }
 }
 

@@ -211,6 +211,8 @@ impl Planner {
             });
             let unit = match &draft.still {
                 None => self.scratch.draft(map, &draft.body, along, warp, request),
+                // Beyond the view nothing is ever served.
+                Some(_) if split[0] >= camera.far() || reach <= camera.near() => [0.0; 2],
                 Some(still) => still.unit_errors(),
             };
             self.units.push(unit);
@@ -363,7 +365,8 @@ impl Scratch {
         set(map, size);
         if let Size::MaxError(wanted) = options.size {
             // Sizes come from errors in s and t at the body's corners. The worst direction may be another.
-            while map.error.max > wanted {
+            // Rounding alone is no reason: a stable map's size would change with the view.
+            while map.error.max > wanted * (1.0 + 1e-9) {
                 let larger = enlarged(options, map.resolution, map.error.max / wanted)?;
                 set(map, larger);
             }

@@ -26,7 +26,7 @@ pub(crate) fn resolutions(
     let limits = Limits::new(options);
     match options.size {
         Size::Exact(size) => {
-            sizes.extend(units.iter().map(|u| if is_empty(u) { [0; 2] } else { size }))
+            sizes.extend(units.iter().map(|u| if is_empty(u) { [0; 2] } else { size }));
         }
         Size::Budget(texels) => {
             let least = (limits.least as u64).pow(2) * units.len() as u64;
@@ -67,6 +67,8 @@ pub(crate) fn enlarged(options: &Options, size: [u32; 2], factor: f64) -> Result
 struct Limits {
     /// Sides are multiples of this.
     align: f64,
+    /// Of a side's texels, those that only leave room to move by whole texels.
+    spare: f64,
     least: f64,
     most: f64,
 }
@@ -74,10 +76,11 @@ struct Limits {
 impl Limits {
     fn new(options: &Options) -> Self {
         let align = f64::from(options.align);
-        let least: f64 = if options.warp == Warp::Stable { 2.0 } else { 1.0 };
+        let spare: f64 = if options.warp == Warp::Stable { 1.0 } else { 0.0 };
         Self {
             align,
-            least: (least / align).ceil() * align,
+            spare,
+            least: ((1.0 + spare) / align).ceil() * align,
             most: (f64::from(options.max_side) / align).floor() * align,
         }
     }
@@ -106,7 +109,10 @@ impl Limits {
 
     /// The least whole sides with errors of no more than `error`.
     fn at_least(&self, unit: [f64; 2], error: f64) -> Result<[u32; 2], Error> {
-        let sides = unit.map(|u| ((u / error / self.align).ceil() * self.align).max(self.least));
+        let sides = unit.map(|u| {
+            let side = u / error + self.spare;
+            ((side / self.align).ceil() * self.align).max(self.least)
+        });
         check(sides.iter().all(|&n| n <= self.most), "options.size", || {
             format!(
                 "so small an error needs a map of {}x{} texels, and sides end at {}",

@@ -34,7 +34,6 @@ impl Still {
             return Self { space, covers, unit_error: 2.0 * slope / pixel };
         }
         let (center, radius) = bounding_sphere(camera, [near, far]);
-        let radius = rounded_up(radius);
         let covers = Covers::Sphere { center: camera.eye() + center, radius };
         Self { space, covers, unit_error: 2.0 * radius / (near * pixel) }
     }
@@ -77,22 +76,16 @@ impl Still {
 }
 
 /// The sphere around the part of the view frustum from `near` to `far`: middle (local space) and radius,
-/// metres.
+/// metres. Found among the view's own axes: wherever the camera is and however it is turned, the radius
+/// is the same to the last digit.
 pub(crate) fn bounding_sphere(camera: &Camera, [near, far]: [f64; 2]) -> (DVec3, f64) {
-    let corners = [near, far].map(|d| camera.corners_at(d));
+    let corners = camera.corner_slopes().map(|slope| slope.extend(1.0));
     // On the axis of the frustum, where near and far corners are equally far, or at the far plane.
-    let axis = corners[1].iter().sum::<DVec3>() / 4.0 / far;
-    let (n2, f2) = (corners[0][0].length_squared(), corners[1][0].length_squared());
-    let along = (corners[1][0] - corners[0][0]).dot(axis) * 2.0;
-    let depth = ((f2 - n2) / along).min(far);
+    let axis = corners.iter().sum::<DVec3>() / 4.0;
+    let depth =
+        ((near + far) * corners[0].length_squared() / (2.0 * corners[0].dot(axis))).min(far);
     let center = axis * depth;
-    let radius = corners.iter().flatten().map(|c| c.distance(center)).fold(0.0, f64::max);
-    (center, radius)
-}
-
-/// The next number up with ten binary digits: the same for a frustum wherever it is and however it
-/// is turned, though its corners are rounded differently.
-fn rounded_up(x: f64) -> f64 {
-    let step = (x.log2().floor() - 10.0).exp2();
-    (x / step).ceil() * step
+    let distances = corners.iter().flat_map(|&c| [near, far].map(|d| (c * d).distance(center)));
+    let radius = distances.fold(0.0, f64::max);
+    (camera.right() * center.x + camera.up() * center.y + camera.forward() * center.z, radius)
 }
