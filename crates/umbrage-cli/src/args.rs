@@ -1,5 +1,6 @@
 //! The command line: what may be asked for, parsed and checked, before any work begins.
 
+use crate::motion::Motion;
 use crate::spec::Technique;
 use crate::values;
 use anyhow::{Result, bail, ensure};
@@ -69,6 +70,9 @@ pub(crate) struct Render {
     /// Rays along each side of a pixel: K×K samples.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
+    /// What the map is fitted to.
+    #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
+    pub(crate) fit: Fit,
     #[command(flatten)]
     pub(crate) execution: ExecutionArgs,
     #[command(flatten)]
@@ -115,6 +119,15 @@ pub(crate) struct Compare {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
+    /// Measure flicker too: how often shadows change in a motion where the truth does not.
+    #[arg(long, value_enum)]
+    pub(crate) motion: Option<Motion>,
+    /// Frames of the motion.
+    #[arg(
+        long, value_name = "N", default_value_t = 8, requires = "motion",
+        value_parser = clap::value_parser!(u32).range(2..=1000)
+    )]
+    pub(crate) frames: u32,
     /// Print report.json to standard output.
     #[arg(long)]
     pub(crate) json: bool,
@@ -198,6 +211,9 @@ pub(crate) struct Plan {
     pub(crate) shadows: Technique,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
+    /// What the maps are fitted to, and their errors the largest over.
+    #[arg(long, value_enum, default_value_t = Fit::Box)]
+    pub(crate) fit: Fit,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -246,8 +262,30 @@ pub(crate) struct ComparisonArgs {
     /// comparisons use 1.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
+    /// What the maps are fitted to.
+    #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
+    pub(crate) fit: Fit,
     #[command(flatten)]
     pub(crate) execution: ExecutionArgs,
+}
+
+/// What shadow maps are fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Fit {
+    /// The box around the scene, air and all.
+    Box,
+    /// Some hundred boxes around its surfaces.
+    Surfaces,
+}
+
+impl Fit {
+    /// Its name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Surfaces => "surfaces",
+        }
+    }
 }
 
 /// Who looks on. What is left out comes from the scene.

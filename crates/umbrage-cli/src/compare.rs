@@ -13,12 +13,17 @@ use umbrage_measure::Report;
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output)?;
     let scene = open_scene(&args.scene.name)?;
-    let stage = Stage::new(&scene, args.scene.opaque)?;
+    let stage = Stage::new(&scene, args.scene.opaque, args.comparison.fit)?;
     let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;
     tell_notices(&scene);
     args.comparison.execution.announce();
-    let progress = Progress::new(comparison.rows(), quiet);
-    let compared = comparison.trace(&progress)?;
+    let rows_in_motion = u64::from(args.frames) * u64::from(args.view.size[1]);
+    let moving = args.motion.map_or(0, |_| rows_in_motion);
+    let progress = Progress::new(comparison.rows() + moving, quiet);
+    let mut compared = comparison.trace(&progress)?;
+    if let Some(motion) = args.motion {
+        compared.move_on(motion, args.frames, &progress)?;
+    }
     let has_shadows = compared.has_shadows();
     let report = folder.replace(|path| compared.write(path, &command_line(), &progress))?;
     drop(progress);
@@ -44,6 +49,7 @@ fn table(report: &Report) -> String {
         "false light",
         "mean error",
         "FLIP",
+        "flicker",
         "px/texel 50%",
         "95%",
         "max",
@@ -62,6 +68,7 @@ fn table(report: &Report) -> String {
             percent(m.false_light),
             number(m.mean_abs_error, 4),
             number(m.flip, 4),
+            percent(r.flicker),
             number(e.p50, 2),
             number(e.p95, 2),
             number(e.max, 1),

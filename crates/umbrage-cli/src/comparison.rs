@@ -1,15 +1,16 @@
 //! One view's comparison: techniques against ray-traced truth, as pictures, figures and a page in a folder.
 
 use crate::args;
-use crate::pixels::{self, Shadowed, Texels, counted, milliseconds};
+use crate::motion::{Motion, Scenery, flicker};
+use crate::pixels::{self, Shadowed, Texels, casters_culled, counted, milliseconds};
 use crate::progress::Progress;
-use crate::setup::{Lamp, Onlooker, lamp, onlooker};
+use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker};
 use crate::spec::Technique;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-use umbrage::{Bounds, Light, Plan, ShadowMap};
+use umbrage::{Light, Plan, ShadowMap};
 use umbrage_measure::{
     ErrorScale, Image, LightInfo, Measured, Page, Pictures, Report, Rgb, Seen, SeenTruth, Times,
     Truth, measure, measure_error_px, partition_map, texel_map, write_pictures, write_report,
@@ -22,6 +23,7 @@ use umbrage_trace::{Reference, Tracer, View};
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
     tracer: Tracer<'a>,
+    receivers: Receivers,
     opaque: bool,
 }
 
@@ -49,6 +51,7 @@ struct Contender<'a> {
     backend: &'static str,
     plan: &'a Plan,
     reference: Reference<'a>,
+    flicker: Option<f64>,
     ms: Times,
     shadowed: Shadowed,
     texels: Texels,
@@ -70,8 +73,10 @@ struct Picture {
 
 impl<'a> Stage<'a> {
     /// `opaque`: alpha-masked materials cast and show as solid.
-    pub(crate) fn new(scene: &'a Scene, opaque: bool) -> Result<Self> {
-        Ok(Self { scene, tracer: Tracer::new(scene)?.opaque(opaque), opaque })
+    pub(crate) fn new(scene: &'a Scene, opaque: bool, fit: args::Fit) -> Result<Self> {
+        let tracer = Tracer::new(scene)?.opaque(opaque);
+        let receivers = Receivers::new(scene, &tracer, fit);
+        Ok(Self { scene, tracer, receivers, opaque })
     }
 
     /// What readers of a report should know.
@@ -97,7 +102,7 @@ impl<'a> Comparison<'a> {
         let lamp = lamp(light, Some(stage.scene))?;
         let view = View::new(&stage.tracer, onlooker.camera, lamp.light, options.samples)
             .context("--samples")?;
-        let bounds = Bounds::of_scene(stage.scene.bounds());
+        let bounds = stage.receivers.bounds();
         let plan = |t| pixels::plan(t, &onlooker.camera, &lamp.light, &bounds);
         let plans = options.shadows.iter().map(plan).collect::<Result<Vec<_>>>()?;
         Ok(Self { stage, options, onlooker, lamp, view, plans })
@@ -130,6 +135,7 @@ impl<'a> Comparison<'a> {
                 backend: self.options.execution.executor(),
                 plan,
                 reference,
+                flicker: None,
                 ms: Times { plan: Some(*ms), depth: Some(milliseconds(start)), ..Times::default() },
                 shadowed: Shadowed::default(),
                 texels: Texels::default(),
@@ -146,6 +152,28 @@ impl Compared<'_> {
         self.truth.counted.contains(&true)
     }
 
+    /// Measures how much every technique flickers in a motion.
+    pub(crate) fn move_on(
+        &mut self,
+        motion: Motion,
+        frames: u32,
+        progress: &Progress,
+    ) -> Result<()> {
+        let Comparison { stage, options, onlooker, lamp, .. } = self.comparison;
+        let scenery = Scenery {
+            tracer: &stage.tracer,
+            bounds: &stage.receivers.bounds(),
+            look: onlooker.look,
+            light: lamp.light,
+            samples: options.samples,
+        };
+        let flicker = flicker(motion, frames, &scenery, &options.shadows, progress)?;
+        for (contender, flicker) in self.contenders.iter_mut().zip(flicker) {
+            contender.flicker = flicker;
+        }
+        Ok(())
+    }
+
     /// Measures, and writes `index.html`, `report.json` and the pictures into an empty `folder`.
     /// `command` is what makes the report again.
     pub(crate) fn write(self, folder: &Path, command: &str, progress: &Progress) -> Result<Report> {
@@ -159,7 +187,7 @@ impl Compared<'_> {
             SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
         let truth_pictures = write_truth_pictures(folder, &seen)?;
         let finished = self.contenders.into_par_iter().enumerate().map(|(i, contender)| {
-            let finished = contender.finish(i + 1, folder, &seen);
+            let finished = contender.finish(i + 1, folder, &seen, stage.scene);
             progress.advance(self.comparison.height());
             finished
         });
@@ -220,6 +248,7 @@ impl Contender<'_> {
         index: usize,
         folder: &Path,
         truth: &SeenTruth<'_>,
+        scene: &Scene,
     ) -> Result<(Measured, Pictures)> {
         let size = truth.visibility.size();
         let picture = Picture::new(size, self.shadowed)?;
@@ -249,6 +278,8 @@ impl Contender<'_> {
             metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
             error_px: measure_error_px(&error_px, truth.counted)?,
             storage_factor: Some(self.plan.storage_factor()),
+            casters_culled: casters_culled(self.plan, scene),
+            flicker: self.flicker,
             ms: self.ms,
         };
         Ok((measured, pictures))

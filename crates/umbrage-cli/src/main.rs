@@ -5,6 +5,7 @@
 mod args;
 mod compare;
 mod comparison;
+mod motion;
 mod output;
 mod pixels;
 mod plan;

@@ -3,9 +3,11 @@
 use crate::spec::Technique;
 use anyhow::Result;
 use glam::Vec3;
+use serde::Serialize;
 use std::time::Instant;
-use umbrage::{Bounds, Camera, Light, Plan, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, ShadowMap};
 use umbrage_measure::Rgb;
+use umbrage_scene::Scene;
 use umbrage_trace::{Band, Reference, Sample, View, shade};
 
 /// What to say of a picture none of whose pixels [count](counted).
@@ -148,7 +150,7 @@ pub(crate) fn plan(
     technique: &Technique,
     camera: &Camera,
     light: &Light,
-    bounds: &Bounds,
+    bounds: &Bounds<'_>,
 ) -> Result<(Plan, f64)> {
     let mut planner = Planner::new();
     let mut plan = || {
@@ -159,6 +161,35 @@ pub(crate) fn plan(
     };
     plan()?;
     plan()
+}
+
+/// Triangles of instances whose boxes may cast into a map, and of the others.
+#[derive(Clone, Copy, Default, Serialize)]
+pub(crate) struct Casters {
+    pub(crate) drawn: u64,
+    pub(crate) culled: u64,
+}
+
+/// For each map, the triangles of the instances whose boxes may cast into it, and of the others.
+pub(crate) fn casters(plan: &Plan, scene: &Scene) -> Vec<Casters> {
+    let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
+    let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
+    let of_map = |map: &ShadowMap| {
+        instances.iter().fold(Casters::default(), |mut sum, &(aabb, triangles)| {
+            *(if map.may_cast(aabb) { &mut sum.drawn } else { &mut sum.culled }) += triangles;
+            sum
+        })
+    };
+    plan.maps.iter().map(of_map).collect()
+}
+
+/// Share of all triangles that are culled, the mean over maps that are not empty.
+pub(crate) fn casters_culled(plan: &Plan, scene: &Scene) -> Option<f64> {
+    let casters = plan.maps.iter().zip(casters(plan, scene));
+    let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);
+    let [drawn, culled] =
+        of_full.fold([0, 0], |[d, c], casters| [d + casters.drawn, c + casters.culled]);
+    (drawn + culled > 0).then(|| culled as f64 / (drawn + culled) as f64)
 }
 
 /// Since `start`.

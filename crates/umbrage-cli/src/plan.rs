@@ -2,16 +2,17 @@
 
 use crate::args;
 use crate::output::print;
-use crate::setup::{Lamp, Onlooker, lamp, onlooker, open_scene, tell_notices};
+use crate::pixels::{Casters, casters, casters_culled};
+use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
 use crate::spec::Technique;
-use anyhow::Result;
+use anyhow::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
 use umbrage::{
-    Aabb, Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size,
-    Warp,
+    Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size, Warp,
 };
 use umbrage_scene::Scene;
+use umbrage_trace::Tracer;
 
 #[derive(Serialize)]
 struct PlanJson {
@@ -85,13 +86,6 @@ struct LayersJson {
     count: u32,
 }
 
-/// Triangles of instances whose boxes may cast into a map, and of the others.
-#[derive(Clone, Copy, Default, Serialize)]
-struct Casters {
-    drawn: u64,
-    culled: u64,
-}
-
 /// A plan, and what follows from it.
 struct Planned<'a> {
     technique: &'a Technique,
@@ -102,6 +96,8 @@ struct Planned<'a> {
     layers: Option<Atlas>,
     /// One for each map; without a scene, none.
     casters: Option<Vec<Casters>>,
+    /// Their share that is culled, the mean over maps.
+    culled: Option<f64>,
 }
 
 /// Plans, and prints the plan.
@@ -113,7 +109,12 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     if let Some(scene) = &scene {
         tell_notices(scene);
     }
-    let bounds = scene.as_ref().map_or_else(Bounds::default, |s| Bounds::of_scene(s.bounds()));
+    let receivers = scene.as_ref().map(|scene| {
+        let tracer = Tracer::new(scene)?;
+        Ok::<_, Error>(Receivers::new(scene, &tracer, args.fit))
+    });
+    let receivers = receivers.transpose()?;
+    let bounds = receivers.as_ref().map_or_else(Bounds::default, Receivers::bounds);
     let technique = &args.shadows;
     let lights: Vec<Light> = lamps.iter().map(|l| l.light).collect();
     let mut planner = Planner::new();
@@ -145,16 +146,8 @@ impl<'a> Planned<'a> {
             lay_out(plan, gutter, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
         });
         let casters = scene.map(|s| casters(plan, s));
-        Self { technique, onlooker, lamps, plan, atlas, layers, casters }
-    }
-
-    /// Share of all triangles that are culled, the mean over maps that are not empty.
-    fn casters_culled(&self) -> Option<f64> {
-        let casters = self.plan.maps.iter().zip(self.casters.as_ref()?);
-        let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);
-        let [drawn, culled] =
-            of_full.fold([0, 0], |[d, c], casters| [d + casters.drawn, c + casters.culled]);
-        (drawn + culled > 0).then(|| culled as f64 / (drawn + culled) as f64)
+        let culled = scene.and_then(|s| casters_culled(plan, s));
+        Self { technique, onlooker, lamps, plan, atlas, layers, casters, culled }
     }
 
     /// x, y, width and height of a map in the atlas, texels.
@@ -194,7 +187,7 @@ impl<'a> Planned<'a> {
             lights: lights.collect(),
             atlas: atlas.map(|a| AtlasJson { size: a.size, gutter: a.gutter_texels }),
             layers: layers.map(|l| LayersJson { size: l.size, count: l.layers }),
-            casters_culled: self.casters_culled(),
+            casters_culled: self.culled,
         }
     }
 
@@ -227,7 +220,7 @@ impl<'a> Planned<'a> {
             };
             line(format_args!("atlas           {atlas}{layers}"));
         }
-        if let Some(share) = self.casters_culled() {
+        if let Some(share) = self.culled {
             line(format_args!("culled          {}", percent(share)));
         }
         for (i, map) in plan.maps.iter().enumerate() {
@@ -287,19 +280,6 @@ impl<'a> Planned<'a> {
         ];
         words.into_iter().flatten().fold(String::new(), |text, word| text + &word + ": ")
     }
-}
-
-/// For each map, the triangles of the instances whose boxes may cast into it, and of the others.
-fn casters(plan: &Plan, scene: &Scene) -> Vec<Casters> {
-    let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
-    let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
-    let of_map = |map: &ShadowMap| {
-        instances.iter().fold(Casters::default(), |mut sum, &(aabb, triangles)| {
-            *(if map.may_cast(aabb) { &mut sum.drawn } else { &mut sum.culled }) += triangles;
-            sum
-        })
-    };
-    plan.maps.iter().map(of_map).collect()
 }
 
 impl From<MapError> for ErrorJson {

@@ -4,10 +4,10 @@ use crate::args::{self, Aov, PictureKind};
 use crate::output::{check_file, note};
 use crate::pixels::{self, NOTHING_TO_SHADOW, Shadowed, Texels, counted, linear_color, middles};
 use crate::progress::Progress;
-use crate::setup::{lamp, onlooker, open_scene, tell_notices};
+use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use glam::DVec3;
-use umbrage::{Bounds, Size};
+use umbrage::Size;
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, partition_map, texel_map, write_exr,
     write_png,
@@ -38,8 +38,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let light = lamp(&args.light, Some(&scene))?.light;
     let tracer = Tracer::new(&scene)?.opaque(args.scene.opaque);
     let view = View::new(&tracer, camera, light, args.samples).context("--samples")?;
-    let bounds = Bounds::of_scene(scene.bounds());
-    let (plan, _) = pixels::plan(&args.shadows, &camera, &light, &bounds)?;
+    let receivers = Receivers::new(&scene, &tracer, args.fit);
+    let (plan, _) = pixels::plan(&args.shadows, &camera, &light, &receivers.bounds())?;
 
     let needs_truth = matches!(args.aov, Aov::Truth | Aov::Difference);
     let needs_map = !matches!(args.aov, Aov::Truth | Aov::Depth | Aov::Normal);

@@ -1,11 +1,12 @@
 //! Construction of what the arguments name: scene, view, light.
 
-use crate::args::{LightArgs, ViewArgs};
+use crate::args::{Fit, LightArgs, ViewArgs};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
-use umbrage::{Aabb, Camera, Light, LookAt};
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt};
 use umbrage_scene::{Scene, SceneCamera, builtins};
+use umbrage_trace::Tracer;
 
 /// Light of an afternoon: 45° high, from the side and a little from behind a viewer who looks along −z.
 const AFTERNOON_SUN: DVec3 = DVec3::new(-0.6, -1.0, -0.8);
@@ -167,6 +168,29 @@ fn depth_range(look: &LookAt, bounds: Aabb) -> [f64; 2] {
         (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt()
     };
     [(distance / corner).max(far / 1000.0), far]
+}
+
+/// Where a scene's shadows fall, as far as the planner is told.
+pub(crate) struct Receivers {
+    all: Aabb,
+    parts: Vec<Aabb>,
+}
+
+/// Boxes around a scene's surfaces. More make planning slower and the maps hardly finer.
+const SURFACE_BOXES: usize = 256;
+
+impl Receivers {
+    pub(crate) fn new(scene: &Scene, tracer: &Tracer<'_>, fit: Fit) -> Self {
+        let parts = match fit {
+            Fit::Box => Vec::new(),
+            Fit::Surfaces => tracer.boxes(SURFACE_BOXES),
+        };
+        Self { all: scene.bounds(), parts }
+    }
+
+    pub(crate) fn bounds(&self) -> Bounds<'_> {
+        Bounds { receiver_parts: &self.parts, ..Bounds::of_scene(self.all) }
+    }
 }
 
 /// The light that the arguments ask for, else the scene's own.

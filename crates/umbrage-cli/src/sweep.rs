@@ -39,6 +39,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
         size: args.size,
         samples: args.comparison.samples,
         opaque: args.opaque,
+        fit: args.comparison.fit.name().into(),
         backend: args.comparison.execution.executor().into(),
     };
     let folder = if args.merge.is_empty() {
@@ -147,7 +148,10 @@ fn compare_missing(
         if let Ok(scene) = &scene {
             progress.aside(|| tell_notices(scene));
         }
-        let stage = scene.as_ref().map_err(again).and_then(|s| Stage::new(s, args.opaque));
+        let stage = scene
+            .as_ref()
+            .map_err(again)
+            .and_then(|s| Stage::new(s, args.opaque, args.comparison.fit));
         for view in pending {
             number += 1;
             progress.name(format!("{number}/{} {}", views.len(), view.inputs.view.name));

@@ -106,6 +106,13 @@ pub struct Measured {
     pub error_px: ErrorPx,
     /// Texels needed per pixel of the picture for an error of 1 (Lloyd et al. 2006, Eq. 12).
     pub storage_factor: Option<f64>,
+    /// Share of the triangles that need not be drawn into a map, the mean over maps that serve anything.
+    #[serde(default)]
+    pub casters_culled: Option<f64>,
+    /// Share of what counts in two frames whose shadow changes from one to the next although the truth
+    /// does not; `None` if nothing moved.
+    #[serde(default)]
+    pub flicker: Option<f64>,
     /// Wall-clock times.
     pub ms: Times,
 }
@@ -176,6 +183,8 @@ pub(crate) mod tests {
                 undefined: 7,
             },
             storage_factor: Some(865.16),
+            casters_culled: Some(0.25),
+            flicker: None,
             ms: Times { plan: Some(0.004), depth: Some(812.5), filter: None, shade: Some(95.25) },
         };
         Report {
@@ -214,6 +223,8 @@ pub(crate) mod tests {
             "mean_abs_error": 0.25, "flip": 0.25,
             "error_px": {"p50": 0.1 + 0.2, "p95": 2.0, "max": 3.5, "undefined": 7},
             "storage_factor": 865.16,
+            "casters_culled": 0.25,
+            "flicker": null,
             "ms": {"plan": 0.004, "depth": 812.5, "filter": null, "shade": 95.25},
         });
         assert_eq!(json["results"], json!([expected]));

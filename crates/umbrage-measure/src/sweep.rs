@@ -30,6 +30,8 @@ pub struct SweepSettings {
     pub samples: u32,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
+    /// What the maps are fitted to: `box` or `surfaces`.
+    pub fit: String,
     /// What renders the shadow maps.
     pub backend: String,
 }
@@ -198,7 +200,7 @@ impl Sweep {
 
 /// The columns of `results.csv` behind the view's own.
 type CsvColumn = (&'static str, fn(&Measured) -> String);
-const CSV: [CsvColumn; 16] = [
+const CSV: [CsvColumn; 17] = [
     ("shadows", |r| r.shadows.clone()),
     ("backend", |r| r.backend.clone()),
     ("maps", |r| r.maps.to_string()),
@@ -214,6 +216,7 @@ const CSV: [CsvColumn; 16] = [
     ("error_px_max", |r| number(r.error_px.max)),
     ("error_px_undefined", |r| r.error_px.undefined.to_string()),
     ("storage_factor", |r| number(r.storage_factor)),
+    ("casters_culled", |r| number(r.casters_culled)),
     ("error", |_| String::new()),
 ];
 
@@ -261,12 +264,24 @@ struct ResultJson<'a> {
     metrics: &'a Metrics,
     error_px: &'a ErrorPx,
     storage_factor: Option<f64>,
+    casters_culled: Option<f64>,
 }
 
 impl<'a> From<&'a Measured> for ResultJson<'a> {
     fn from(measured: &'a Measured) -> Self {
-        let Measured { shadows, backend, maps, texels, metrics, error_px, storage_factor, ms: _ } =
-            measured;
+        // Sweeps stand still, and their tables tell no times.
+        let Measured {
+            shadows,
+            backend,
+            maps,
+            texels,
+            metrics,
+            error_px,
+            storage_factor,
+            casters_culled,
+            flicker: _,
+            ms: _,
+        } = measured;
         Self {
             shadows,
             backend,
@@ -275,6 +290,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             metrics,
             error_px,
             storage_factor: *storage_factor,
+            casters_culled: *casters_culled,
         }
     }
 }
@@ -318,6 +334,7 @@ pub(crate) mod tests {
                 size: [64, 48],
                 samples: 4,
                 opaque: true,
+                fit: "surfaces".to_owned(),
                 backend: "reference".to_owned(),
             },
             views: views.iter().enumerate().map(view).collect(),

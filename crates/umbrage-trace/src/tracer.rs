@@ -51,13 +51,20 @@ pub struct Surface {
     pub base_color: Vec3,
 }
 
-/// A node of a tree, of those over the instances or of an instance's mesh, on the way to
-/// [`Tracer::boxes`].
+/// A box on the way to [`Tracer::boxes`].
 #[derive(Clone, Copy)]
 struct Opened {
     aabb: Aabb,
-    node: Node,
-    instance: Option<u32>,
+    what: What,
+}
+
+/// What is in a box.
+#[derive(Clone, Copy)]
+enum What {
+    Instances(Node),
+    /// Of an instance.
+    Triangles(u32, Node),
+    Triangle,
 }
 
 impl Opened {
@@ -196,42 +203,50 @@ impl<'a> Tracer<'a> {
     ///
     /// The largest are opened first, down the trees that rays are traced with.
     pub fn boxes(&self, limit: usize) -> Vec<Aabb> {
-        let instances = |node| Opened {
-            aabb: self.instances.aabb(node).intersection(self.bounds),
-            node,
-            instance: None,
-        };
-        let within = |instance: u32, node| {
+        let part = |aabb: Aabb, what| Opened { aabb: aabb.intersection(self.bounds), what };
+        let instances = |node| part(self.instances.aabb(node), What::Instances(node));
+        let boxes_of = |instance: u32| {
             let placement = &self.placements[instance as usize];
-            let aabb = placement.bounds(self.meshes[placement.mesh].boxes.aabb(node));
-            Opened { aabb: aabb.intersection(self.bounds), node, instance: Some(instance) }
+            (placement, &self.meshes[placement.mesh].boxes)
         };
-        let mut open: BinaryHeap<Opened> =
-            self.instances.root().map(instances).into_iter().collect();
-        let mut closed = Vec::new();
-        while let Some(largest) = open.pop() {
-            let children: Vec<Opened> = match largest.instance {
-                None => match self.instances.open(largest.node) {
+        let triangles = |instance, node| {
+            let (placement, boxes) = boxes_of(instance);
+            part(placement.bounds(boxes.aabb(node)), What::Triangles(instance, node))
+        };
+        let triangle = |primitive: PrimitiveRef| {
+            let (placement, _) = boxes_of(primitive.instance);
+            let to_world = |p| placement.world_from_mesh.transform_point3(p);
+            part(Aabb::around(self.corners(primitive).map(to_world)), What::Triangle)
+        };
+        let open = |what| -> Vec<Opened> {
+            match what {
+                What::Instances(node) => match self.instances.open(node) {
                     Ok(nodes) => nodes.map(instances).into(),
                     Err(leaf) => leaf
                         .iter()
-                        .filter_map(|&i| {
-                            let mesh = self.placements[i as usize].mesh;
-                            Some(within(i, self.meshes[mesh].boxes.root()?))
-                        })
+                        .filter_map(|&i| Some(triangles(i, boxes_of(i).1.root()?)))
                         .collect(),
                 },
-                Some(instance) => {
-                    let mesh = self.placements[instance as usize].mesh;
-                    let nodes = self.meshes[mesh].boxes.open(largest.node);
-                    nodes.map_or(Vec::new(), |nodes| nodes.map(|n| within(instance, n)).into())
-                }
-            };
-            let fits = open.len() + closed.len() + children.len() <= limit;
-            if children.is_empty() || !fits {
+                What::Triangles(instance, node) => match boxes_of(instance).1.open(node) {
+                    Ok(nodes) => nodes.map(|node| triangles(instance, node)).into(),
+                    Err(leaf) => {
+                        let of_leaf = leaf.iter().map(|&t| PrimitiveRef { instance, triangle: t });
+                        of_leaf.map(triangle).collect()
+                    }
+                },
+                What::Triangle => Vec::new(),
+            }
+        };
+        let mut opened: BinaryHeap<Opened> =
+            self.instances.root().map(instances).into_iter().collect();
+        let mut closed = Vec::new();
+        while let Some(largest) = opened.pop() {
+            let parts = open(largest.what);
+            let fits = opened.len() + closed.len() + parts.len() <= limit;
+            if parts.is_empty() || !fits {
                 closed.push(largest.aabb);
             } else {
-                open.extend(children);
+                opened.extend(parts);
             }
         }
         closed

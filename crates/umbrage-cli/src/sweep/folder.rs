@@ -194,6 +194,7 @@ pub(super) fn differences(present: &SweepSettings, wanted: &SweepSettings) -> Ve
             ("--max-error", s.max_error.map_or("off".to_owned(), |pixels| pixels.to_string())),
             ("--size", format!("{}x{}", s.size[0], s.size[1])),
             ("--samples", s.samples.to_string()),
+            ("--fit", s.fit.clone()),
             ("--opaque", if s.opaque { "on" } else { "off" }.to_owned()),
             ("--backend", s.backend.clone()),
         ]

@@ -206,12 +206,17 @@ fn means_over(sweep: &Sweep, means: &[Mean]) -> String {
     text + "."
 }
 
+fn fitted_to(fit: &str) -> &'static str {
+    if fit == "box" { "the box around the scene" } else { "the scene's surfaces" }
+}
+
 fn setup(sweep: &Sweep) -> Vec<(&'static str, String)> {
     let settings = &sweep.settings;
     let [w, h] = settings.size;
     let mut setup = vec![
         ("Pictures", format!("{w} × {h} pixels, where a view has no size of its own")),
         ("Truth", rays_a_pixel(settings.samples.pow(2))),
+        ("Maps fitted to", fitted_to(&settings.fit).to_owned()),
         ("Executed by", settings.backend.clone()),
     ];
     if let Some(pixels) = settings.max_error {

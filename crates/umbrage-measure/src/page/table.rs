@@ -79,6 +79,15 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
             "Texels needed per pixel for an error of one pixel per texel",
             |r| r.storage_factor,
         ),
+        share(column("Culled", "%", "Triangles that need not be drawn into a map", |r| {
+            r.casters_culled
+        })),
+        share(column(
+            "Flicker",
+            "%",
+            "Points whose shadow changes between frames although the truth does not",
+            |r| r.flicker,
+        )),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
         whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
         time(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),

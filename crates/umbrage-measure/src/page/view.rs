@@ -244,6 +244,11 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
         ("px/texel, p95", known(e.p95)),
         ("px/texel, max", known(e.max)),
         ("Storage factor", known(r.storage_factor)),
+        (
+            "Casters culled",
+            r.casters_culled.map(|share| format!("{} %", significant(share * 100.0))),
+        ),
+        ("Flicker", r.flicker.map(|share| format!("{} %", significant(share * 100.0)))),
         ("Maps", Some(count(u64::from(r.maps)))),
         ("Texels", Some(count(r.texels))),
         ("Time", times),

@@ -1,0 +1,130 @@
+//! Flicker: shadows that change from frame to frame where the truth does not.
+
+use crate::pixels;
+use crate::progress::Progress;
+use crate::spec::Technique;
+use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
+use glam::{DQuat, DVec3};
+use rayon::prelude::*;
+use umbrage::{Bounds, Camera, Light, LookAt, Plan};
+use umbrage_trace::{Reference, Sample, Tracer, View};
+
+/// A motion, in steps as small as between the frames of a film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Motion {
+    /// The viewer moves forward, by a hundredth of the distance to the target a frame.
+    Dolly,
+    /// The viewer circles the target, half a degree a frame.
+    Orbit,
+    /// The light turns about the vertical, a tenth of a degree a frame.
+    Sun,
+}
+
+/// What moves, through what.
+pub(crate) struct Scenery<'a> {
+    pub(crate) tracer: &'a Tracer<'a>,
+    pub(crate) bounds: &'a Bounds<'a>,
+    pub(crate) look: LookAt,
+    pub(crate) light: Light,
+    /// Rays along each side of a pixel.
+    pub(crate) samples: u32,
+}
+
+impl Motion {
+    /// View and light of a frame; the first is as told.
+    fn frame(self, look: LookAt, light: Light, index: u32) -> Result<(Camera, Light)> {
+        let index = f64::from(index);
+        let mut frame = (look, light);
+        match self {
+            Self::Dolly => {
+                let step = (look.target - look.eye) * (0.01 * index);
+                frame.0.eye += step;
+                frame.0.target += step;
+            }
+            Self::Orbit => {
+                let axis = look.up.normalize_or(DVec3::Y);
+                let turn = DQuat::from_axis_angle(axis, (0.5 * index).to_radians());
+                frame.0.eye = look.target + turn * (look.eye - look.target);
+            }
+            Self::Sun => {
+                let turn = DQuat::from_rotation_y((0.1 * index).to_radians());
+                match &mut frame.1 {
+                    Light::Directional { direction } => *direction = turn * *direction,
+                    Light::Spot(spot) => spot.direction = turn * spot.direction,
+                    Light::Point(_) => bail!("--motion: a point light has no direction to turn"),
+                }
+            }
+        }
+        let camera = Camera::look_at(frame.0).context("--motion")?;
+        Ok((camera, frame.1))
+    }
+}
+
+/// A frame's view, and every technique's plan for it.
+struct Frame<'a> {
+    view: View<'a>,
+    plans: Vec<Plan>,
+}
+
+/// The share of pixels, for each technique, whose shadow changes between frames where the truth does not.
+///
+/// What a pixel shows is followed back into the frame before, where it must have been seen as well, and
+/// the truth and the technique are asked there again. So only shadows count that change on a point of a
+/// surface, and not what appears, vanishes or moves across the picture. Compared are points that face
+/// the light in both frames; `None` if there are none.
+pub(crate) fn flicker(
+    motion: Motion,
+    frames: u32,
+    scenery: &Scenery<'_>,
+    techniques: &[Technique],
+    progress: &Progress,
+) -> Result<Vec<Option<f64>>> {
+    let Scenery { tracer, bounds, look, light, samples } = *scenery;
+    let frames = (0..frames).map(|i| {
+        let (camera, light) = motion.frame(look, light, i)?;
+        let view = View::new(tracer, camera, light, samples).context("--samples")?;
+        let plan = |t| pixels::plan(t, &camera, &light, bounds).map(|(plan, _)| plan);
+        let plans = techniques.iter().map(plan).collect::<Result<_>>()?;
+        Ok(Frame { view, plans })
+    });
+    let frames: Vec<Frame<'_>> = frames.collect::<Result<_>>()?;
+    let mut changed = vec![0u64; techniques.len()];
+    let mut compared = 0u64;
+    let mut before: Option<(&View<'_>, Vec<Reference<'_>>)> = None;
+    for (i, frame) in frames.iter().enumerate() {
+        progress.stage(format!("motion: frame {} of {}", i + 1, frames.len()));
+        let render = |(technique, plan): (&Technique, _)| {
+            Ok(Reference::render(tracer, plan, technique.filter, &|_| {})?)
+        };
+        let now = techniques.iter().zip(&frame.plans).map(render).collect::<Result<Vec<_>>>()?;
+        if let Some((last_view, last)) = &before {
+            for rows in frame.view.bands() {
+                let band = frame.view.band(rows, &|_| {});
+                let steady = band.map(|s| steady(s, &frame.view, last_view), &|_| {});
+                compared += steady.iter().flatten().count() as u64;
+                for ((changed, now), last) in changed.iter_mut().zip(&now).zip(last) {
+                    *changed += steady
+                        .par_iter()
+                        .flatten()
+                        .filter(|[s, was]| {
+                            (now.visibility(0, s) - last.visibility(0, was)).abs() > 0.5
+                        })
+                        .count() as u64;
+                }
+            }
+        }
+        progress.advance(u64::from(look.image[1]));
+        before = Some((&frame.view, now));
+    }
+    Ok(changed.iter().map(|&n| (compared > 0).then(|| n as f64 / compared as f64)).collect())
+}
+
+/// A sample as it is and as it was in the frame before, if it counts in both and the truth about it has
+/// not changed.
+fn steady(sample: &Sample, view: &View<'_>, last: &View<'_>) -> Option<[Sample; 2]> {
+    let counts = |s: &Sample, view: &View<'_>| s.is_facing && s.depth <= view.camera().far();
+    let was = last.sees(&sample.surface)?;
+    let both_count = counts(sample, view) && counts(&was, last);
+    (both_count && view.truth(sample) == last.truth(&was)).then_some([*sample, was])
+}
