@@ -91,7 +91,8 @@ pub(crate) fn partition() -> impl Strategy<Value = Partition> {
         1 => Just(Faces::Sides),
         1 => Just(Faces::SidesAndNear),
     ];
-    let some = (1u32..=16, splits, overlap, faces)
+    let slices = prop_oneof![4 => 1u32..=4, 1 => 5u32..=16];
+    let some = (slices, splits, overlap, faces)
         .prop_map(|(slices, splits, overlap, faces)| Partition { slices, splits, overlap, faces });
     prop_oneof![1 => Just(Partition::default()), 2 => some]
 }

@@ -1,0 +1,255 @@
+//! How texels are shared out: budgets by error, sizes by error, what devices allow.
+
+mod common;
+
+use common::{Config, WARPS, camera, config, direction, options, partition, possible};
+use glam::DVec3;
+use proptest::prelude::*;
+use umbrage::{
+    Bounds, Camera, Error, Faces, Light, LookAt, Objective, Options, Partition, Plan, Planner,
+    PointLight, ShadowMap, Size, Splits, Warp,
+};
+
+/// Warps under which the largest errors are known exactly.
+const EXACT: [Warp; 4] =
+    [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage), Warp::Log];
+
+fn suns() -> impl Strategy<Value = (Config, Vec<Light>)> {
+    let sunny =
+        config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. }));
+    (sunny, proptest::collection::vec(direction(), 0..3)).prop_map(|(config, more)| {
+        let more = more.into_iter().map(|direction| Light::Directional { direction });
+        let lights = std::iter::once(config.light).chain(more).collect();
+        (config, lights)
+    })
+}
+
+fn plan(config: &Config, lights: &[Light], options: &Options) -> Plan {
+    Planner::new().plan(&config.camera, lights, &config.bounds, options).unwrap().clone()
+}
+
+fn maps(plan: &Plan) -> impl Iterator<Item = &ShadowMap> {
+    plan.maps.iter().filter(|m| !m.is_empty())
+}
+
+/// Least and largest of the errors in s and t over all sides that are neither cut nor too short to be
+/// divided finely.
+fn spread(plan: &Plan, max_side: u32, least: u32) -> (f64, f64) {
+    let of_map = |m: &ShadowMap| {
+        let [s, t] = m.resolution;
+        [(s, m.error.max_s), (t, m.error.max_t)]
+    };
+    maps(plan)
+        // What is cut on one side is not free on the other.
+        .filter(|m| m.resolution.iter().all(|n| (least..max_side).contains(n)))
+        .flat_map(of_map)
+        .fold((f64::INFINITY, 0f64), |(lo, hi), (_, e)| (lo.min(e), hi.max(e)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// All maps of all lights have the same largest error in s and in t, and a large budget is used.
+    #[test]
+    fn a_budget_makes_all_errors_alike(
+        (config, lights) in suns(),
+        partition in partition(),
+        pick in 0..EXACT.len(),
+        budget in 22..=28u32,
+    ) {
+        let budget = 1u64 << budget;
+        let options = Options { size: Size::Budget(budget), partition, ..options(EXACT[pick]) };
+        let plan = plan(&config, &lights, &options);
+        let (lo, hi) = spread(&plan, options.max_side, 100);
+        // A texel more or less on a side of a hundred, and what that leaves to the other side.
+        prop_assert!(hi <= lo * 1.021 || hi == 0.0, "{lo} to {hi}");
+        prop_assert!(plan.texels() <= budget);
+        let all_long = maps(&plan).all(|m| m.resolution.iter().all(|n| (100..1 << 16).contains(n)));
+        prop_assert!(!all_long || plan.texels() as f64 >= 0.98 * budget as f64, "{}", plan.texels());
+    }
+
+    /// What a side must not have goes to the other side and to other maps; sides are aligned.
+    #[test]
+    fn devices_limits_are_kept(
+        (config, lights) in suns(),
+        partition in partition(),
+        pick in 0..EXACT.len(),
+        max_side in 256..2048u32,
+        align in prop_oneof![Just(1u32), Just(4), Just(7)],
+        budget in 18..=24u32,
+    ) {
+        let budget = 1u64 << budget;
+        let size = Size::Budget(budget);
+        let options = Options { size, partition, max_side, align, ..options(EXACT[pick]) };
+        let plan = plan(&config, &lights, &options);
+        prop_assert!(plan.texels() <= budget);
+        let longest = max_side / align * align;
+        for map in maps(&plan) {
+            prop_assert!(map.resolution.iter().all(|&n| n <= longest && n % align == 0 && n > 0));
+        }
+        let (lo, hi) = spread(&plan, longest, 100);
+        let step = 1.021 + 0.02 * f64::from(align - 1);
+        prop_assert!(hi <= lo * step || hi == 0.0, "{lo} to {hi}");
+        let all = maps(&plan).count() as u64 * u64::from(longest).pow(2);
+        // Short sides are rounded down a lot.
+        let all_long = maps(&plan).all(|m| m.resolution.iter().all(|&n| n >= 20 * align));
+        let wanted = 0.9 * budget.min(all) as f64;
+        prop_assert!(!all_long || plan.texels() as f64 >= wanted, "{} of {wanted}", plan.texels());
+    }
+
+    /// A size by error keeps the error, and a fifth fewer texels, however they are shared, do not.
+    #[test]
+    fn sizes_by_error_are_the_least(
+        config in config(),
+        partition in partition(),
+        pick in 0..WARPS.len(),
+        budget in 18..=22u32,
+    ) {
+        let warp = WARPS[pick].1;
+        let partition = possible(partition, warp);
+        let largest = |plan: &Plan| maps(plan).map(|m| m.error.max).fold(0.0, f64::max);
+        let with = |size| {
+            let options = Options { partition, size, ..options(warp) };
+            Planner::new().plan(&config.camera, &[config.light], &config.bounds, &options).cloned()
+        };
+        let Ok(by_budget) = with(Size::Budget(1 << budget)) else { return Ok(()) };
+        let wanted = largest(&by_budget) * 1.0001;
+        prop_assume!(wanted > 0.0);
+        match with(Size::MaxError(wanted)) {
+            Ok(by_error) => {
+                prop_assert!(largest(&by_error) <= wanted * (1.0 + 1e-9));
+                let is_fine = maps(&by_error).all(|m| m.resolution.iter().all(|&n| n >= 40));
+                // Stable maps are sized for the worst that they may ever see.
+                if is_fine && warp != Warp::Stable {
+                    let fewer = with(Size::Budget((by_error.texels() as f64 * 0.8) as u64)).unwrap();
+                    prop_assert!(largest(&fewer) > wanted, "{} of {wanted}", largest(&fewer));
+                }
+            }
+            Err(error) => {
+                // A side was cut.
+                let is_cut = |m: &ShadowMap| m.resolution.iter().any(|&n| n > 20_000);
+                prop_assert!(warp == Warp::Stable || maps(&by_budget).any(is_cut), "{error}");
+            }
+        }
+    }
+
+    /// Plans depend on their input alone, to the last bit: not on what was planned before, nor on errors.
+    #[test]
+    fn planners_have_no_memory(
+        (first, second) in (config(), config()),
+        (one, other) in (partition(), partition()),
+        (pick, other_pick) in (0..WARPS.len(), 0..WARPS.len()),
+    ) {
+        let options = |partition, pick: usize| {
+            let warp = WARPS[pick].1;
+            Options { partition: possible(partition, warp), ..common::options(warp) }
+        };
+        let (a, b) = (options(one, pick), options(other, other_pick));
+        let fresh = plan(&first, &[first.light], &a);
+        let mut planner = Planner::new();
+        let lights = [second.light, first.light];
+        planner.plan(&second.camera, &lights, &second.bounds, &b).unwrap();
+        let too_small = Options { size: Size::MaxError(1e-12), ..b };
+        let _ = planner.plan(&second.camera, &lights, &second.bounds, &too_small);
+        let broken = [second.light, Light::Directional { direction: DVec3::ZERO }];
+        planner.plan(&second.camera, &broken, &second.bounds, &b).unwrap_err();
+        let again = planner.plan(&first.camera, &[first.light], &first.bounds, &a).unwrap();
+        // Text tells −0 from 0.
+        prop_assert_eq!(format!("{again:?}"), format!("{fresh:?}"));
+    }
+
+    /// Maps of several lights are those that each has alone, but for their resolution.
+    #[test]
+    fn lights_do_not_mix(
+        camera in camera(),
+        directions in proptest::collection::vec(direction(), 2..4),
+        partition in partition(),
+    ) {
+        let lights: Vec<Light> =
+            directions.into_iter().map(|direction| Light::Directional { direction }).collect();
+        let size = Size::Exact([64, 32]);
+        let options = Options { partition, size, ..options(Warp::Lispsm) };
+        let config = Config { camera, light: lights[0], bounds: Bounds::default() };
+        let together = plan(&config, &lights, &options);
+        for (i, (&light, planned)) in lights.iter().zip(&together.lights).enumerate() {
+            let mut alone = plan(&config, &[light], &options);
+            alone.maps.iter_mut().for_each(|m| m.part.light = i);
+            prop_assert_eq!(&together.maps[planned.maps.clone()], &alone.maps[..]);
+            prop_assert_eq!(planned.theta_rad, alone.lights[0].theta_rad);
+        }
+    }
+}
+
+fn view() -> Camera {
+    Camera::look_at(LookAt {
+        eye: DVec3::new(0.0, 2.0, 5.0),
+        target: DVec3::ZERO,
+        up: DVec3::Y,
+        fov_y_rad: 1.0,
+        near: 0.1,
+        far: 100.0,
+        image: [640, 480],
+    })
+    .unwrap()
+}
+
+const SUN: Light = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) };
+
+/// What cannot be had is an error of the size, and what just can be had is planned.
+#[test]
+fn sizes_that_cannot_be_had() {
+    let lamp = Light::Point(PointLight { position: DVec3::ZERO, near: 0.1, range: 50.0 });
+    let slices = |k| Partition::slices(k);
+    let faces = Partition { faces: Faces::SidesAndNear, ..slices(3) };
+    let cases: [(&[Light], Partition, Warp, Size, bool); 14] = [
+        (&[SUN], slices(4), Warp::Uniform, Size::Budget(3), false),
+        (&[SUN], slices(4), Warp::Uniform, Size::Budget(4), true),
+        (&[SUN, SUN], slices(4), Warp::Uniform, Size::Budget(7), false),
+        (&[SUN, SUN], slices(4), Warp::Uniform, Size::Budget(8), true),
+        (&[SUN], faces, Warp::Lispsm, Size::Budget(12), false),
+        (&[SUN], faces, Warp::Lispsm, Size::Budget(13), true),
+        (&[lamp], slices(2), Warp::Lispsm, Size::Budget(11), false),
+        (&[lamp], slices(2), Warp::Lispsm, Size::Budget(12), true),
+        (&[SUN], slices(4), Warp::Stable, Size::Budget(15), false),
+        (&[SUN], slices(4), Warp::Stable, Size::Budget(16), true),
+        (&[SUN], slices(1), Warp::Uniform, Size::MaxError(1e-9), false),
+        (&[SUN], slices(16), Warp::Uniform, Size::MaxError(1e-9), false),
+        (&[lamp], slices(1), Warp::Lispsm, Size::MaxError(1e-9), false),
+        (&[SUN], slices(4), Warp::Lispsm, Size::MaxError(1e9), true),
+    ];
+    let mut planner = Planner::new();
+    for (lights, partition, warp, size, can_be) in cases {
+        let options = Options { warp, partition, size, ..Options::default() };
+        let what = format!("{partition:?} {warp:?} {size:?}");
+        match planner.plan(&view(), lights, &Bounds::default(), &options) {
+            Ok(plan) => {
+                assert!(can_be, "{what}");
+                let texels = plan.texels();
+                assert!(
+                    !matches!(size, Size::Budget(budget) if texels > budget),
+                    "{what}: {texels}"
+                );
+            }
+            Err(Error::Invalid { field, problem }) => {
+                assert!(
+                    !can_be && field == "options.size" && !problem.is_empty(),
+                    "{what}: {field}"
+                );
+            }
+            Err(error) => panic!("{what}: {error}"),
+        }
+    }
+}
+
+/// Fitted slices do not change how many texels errors need by much: every map gets its even share.
+#[test]
+fn fitted_slices_share_evenly() {
+    let partition = Partition { splits: Splits::Fitted, ..Partition::slices(4) };
+    let options = Options { partition, ..Options::default() };
+    let mut planner = Planner::new();
+    let plan = planner.plan(&view(), &[SUN], &Bounds::default(), &options).unwrap();
+    for map in &plan.maps {
+        let share = map.texels() as f64 / plan.texels() as f64;
+        assert!((share - 0.25).abs() < 0.01, "{share}");
+    }
+}
