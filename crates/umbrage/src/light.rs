@@ -151,8 +151,11 @@ pub(crate) enum Lamp {
     },
 }
 
-/// Shares of a coordinate below this are lost in clipping.
-const ROUNDING: f64 = 1e-11;
+/// A pyramid's near distance, but far enough from the apex to be told from it among coordinates as large
+/// as `size`, metres: at the apex itself there is no map.
+fn near_end(near: f64, apex: DVec3, size: f64) -> f64 {
+    near.max(1e-11 * apex.length().max(size))
+}
 
 impl Lamp {
     /// The way it shines, and the position of a pyramid's apex relative to `origin` (world space).
@@ -164,8 +167,7 @@ impl Lamp {
     }
 
     /// The four sides of a pyramid, then its near and far end, relative to `origin` (world space); none
-    /// for directional lights. The near end is far enough from the apex to be told from it among
-    /// coordinates as large as `size`, metres: at the apex itself there is no map.
+    /// for directional lights. What is to be clipped reaches as far as `size`, metres.
     pub(crate) fn frustum(&self, origin: DVec3, size: f64) -> Option<[Plane; 6]> {
         let Self::Pyramid { position, direction: axis, slope, near, range } = *self else {
             return None;
@@ -178,7 +180,7 @@ impl Lamp {
             side(-a),
             side(b),
             side(-b),
-            Plane::through(apex + axis * near.max(ROUNDING * apex.length().max(size)), axis),
+            Plane::through(apex + axis * near_end(near, apex, size), axis),
             Plane::through(apex + axis * range, -axis),
         ])
     }
@@ -189,11 +191,12 @@ impl Lamp {
         let Self::Pyramid { position, direction, slope, near, range } = *self else {
             return None;
         };
+        let apex = position - origin;
         let (a, b) = perpendicular_pair(direction).into();
         Some(std::array::from_fn(|i| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
-            let depth = if i >> 2 & 1 == 1 { range } else { near };
-            position - origin + (direction + a * sign(0) + b * sign(1)) * depth
+            let depth = if i >> 2 & 1 == 1 { range } else { near_end(near, apex, 0.0) };
+            apex + (direction + a * sign(0) + b * sign(1)) * depth
         }))
     }
 }

@@ -305,8 +305,8 @@ impl Scratch {
         };
 
         let family = OnePoint::around(covered, space);
-        let unfitted = match warp {
-            Warp::Psm => psm(space, camera, body.vertices()),
+        let fitted = match warp {
+            Warp::Psm => psm(space, camera, body.vertices()).and_then(|h| fit(h, covered)),
             _ => None,
         };
         // Errors at one texel decide the resolution.
@@ -317,8 +317,8 @@ impl Scratch {
             [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, space);
             map.lambda = lambda(homography, seen);
         };
-        if let Some(unfitted) = unfitted {
-            set(map, fit(unfitted, covered));
+        if let Some(fitted) = fitted {
+            set(map, fitted);
             return unit_errors(map, body, camera);
         }
         let nu = family.strength(warp, covered, space, camera);

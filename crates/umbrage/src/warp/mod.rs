@@ -110,9 +110,9 @@ impl OnePoint {
         space: &LightSpace,
         camera: &Camera,
     ) -> f64 {
-        match warp {
+        let strength = match warp {
             Warp::Unfocused | Warp::Stable | Warp::Uniform | Warp::Psm => 0.0,
-            Warp::Lambda(lambda) => (self.mu / lambda).min(MAX_STRENGTH),
+            Warp::Lambda(lambda) => self.mu / lambda,
             Warp::Adaptive(objective) => {
                 // As the view turns into the light z swings around, and what is best for one z is
                 // not for its opposite. The cost has one valley, so that less warp than the best is
@@ -140,7 +140,8 @@ impl OnePoint {
                 let phi = camera.tan_half_fov_y().atan();
                 nu.min(view.strength(view.n)) * (view.sin_theta / phi.sin()).min(1.0)
             }),
-        }
+        };
+        strength.min(MAX_STRENGTH)
     }
 
     /// A strength that follows from the view; none where the view runs along the light and z has no
