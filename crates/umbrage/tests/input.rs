@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{WARPS, options};
+use common::{WARPS, map_count, options, possible};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use umbrage::{
-    Aabb, Bounds, Camera, ClipDepth, Error, Light, LookAt, Options, Planner, Size, SpotLight, Warp,
+    Aabb, Bounds, Camera, ClipDepth, Error, Faces, Light, LookAt, Options, Partition, Plan,
+    Planner, PointLight, Size, Splits, SpotLight, Warp,
 };
 
 const VIEW: LookAt = LookAt {
@@ -25,6 +26,7 @@ const SPOT: SpotLight = SpotLight {
     near: 0.1,
     range: 50.0,
 };
+const LAMP: PointLight = PointLight { position: DVec3::new(2.0, 4.0, 1.0), near: 0.1, range: 50.0 };
 
 fn field<T: std::fmt::Debug>(result: Result<T, Error>) -> &'static str {
     match result {
@@ -64,15 +66,15 @@ fn cameras_name_what_is_wrong() {
 }
 
 #[test]
-fn lights_bounds_and_options_name_what_is_wrong() {
+fn lights_and_bounds_name_what_is_wrong() {
     let camera = Camera::look_at(VIEW).unwrap();
-    let plan = |light: Light, bounds: Bounds, options: Options| {
-        field(Planner::new().plan(&camera, &[light], &bounds, &options))
+    let plan = |light: Light, bounds: &Bounds| {
+        // The first light is fine.
+        field(Planner::new().plan(&camera, &[SUN, light], bounds, &Options::default()))
     };
     let none = Bounds::default();
     for direction in [DVec3::ZERO, DVec3::NAN, DVec3::new(0.0, f64::INFINITY, 0.0)] {
-        let light = Light::Directional { direction };
-        assert_eq!(plan(light, none, Options::default()), "light.direction");
+        assert_eq!(plan(Light::Directional { direction }, &none), "light.direction");
     }
     for (spot, expected) in [
         (SpotLight { position: DVec3::NAN, ..SPOT }, "light.position"),
@@ -83,34 +85,113 @@ fn lights_bounds_and_options_name_what_is_wrong() {
         (SpotLight { range: 0.1, ..SPOT }, "light.range"),
         (SpotLight { range: f64::NAN, ..SPOT }, "light.range"),
     ] {
-        assert_eq!(plan(Light::Spot(spot), none, Options::default()), expected);
+        assert_eq!(plan(Light::Spot(spot), &none), expected);
+    }
+    for (point, expected) in [
+        (PointLight { position: DVec3::INFINITY, ..LAMP }, "light.position"),
+        (PointLight { position: DVec3::splat(1e13), ..LAMP }, "light.position"),
+        (PointLight { near: 0.0, ..LAMP }, "light.near"),
+        (PointLight { near: f64::NAN, ..LAMP }, "light.near"),
+        (PointLight { range: 0.1, ..LAMP }, "light.range"),
+        (PointLight { range: f64::INFINITY, ..LAMP }, "light.range"),
+    ] {
+        assert_eq!(plan(Light::Point(point), &none), expected);
     }
     let upside_down = Aabb { min: DVec3::ONE, max: DVec3::ZERO };
-    let bounds = Bounds { receivers: Some(upside_down), ..none };
-    assert_eq!(plan(SUN, bounds, Options::default()), "bounds.receivers");
     let nan = Aabb { min: DVec3::ZERO, max: DVec3::NAN };
-    assert_eq!(
-        plan(SUN, Bounds { casters: Some(nan), ..none }, Options::default()),
-        "bounds.casters"
-    );
-    for (changed, expected) in [
-        (Options { size: Size::Budget(0), ..Options::default() }, "options.size"),
-        (Options { size: Size::Exact([0, 5]), ..Options::default() }, "options.size"),
-        (Options { size: Size::Exact([5, 9000]), ..Options::default() }, "options.size"),
-        (Options { max_side: 0, ..Options::default() }, "options.max_side"),
-        (Options { warp: Warp::Lambda(0.0), ..Options::default() }, "options.warp.lambda"),
-        (Options { warp: Warp::Lambda(f64::NAN), ..Options::default() }, "options.warp.lambda"),
-        (
-            Options { warp: Warp::Tsm { focus: Some(-1.0) }, ..Options::default() },
-            "options.warp.focus",
-        ),
+    for (bounds, expected) in [
+        (Bounds { receivers: Some(upside_down), ..none }, "bounds.receivers"),
+        (Bounds { receiver_parts: &[Aabb::EMPTY, nan], ..none }, "bounds.receiver_parts"),
+        (Bounds { casters: Some(nan), ..none }, "bounds.casters"),
     ] {
-        assert_eq!(plan(SUN, none, changed), expected);
+        assert_eq!(plan(SUN, &bounds), expected);
     }
 }
 
-/// Lights along the view, from behind and in front, up along the view, narrow and huge ranges, one-texel
-/// budgets, flat and point-like worlds: every plan is finite and within its budget.
+#[test]
+fn options_name_what_is_wrong() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let some = Options::default();
+    let four = Partition::slices(4);
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+    let at = |ends: &[f64]| {
+        let mut all = [nan; Partition::MAX_SLICES - 1];
+        all[..ends.len()].copy_from_slice(ends);
+        Options { partition: Partition { splits: Splits::At(all), ..four }, ..some }
+    };
+    let practical = |blend| Options {
+        partition: Partition { splits: Splits::Practical(blend), ..four },
+        ..some
+    };
+    let overlap = |overlap| Options { partition: Partition { overlap, ..four }, ..some };
+    let slices = |slices| Options { partition: Partition { slices, ..four }, ..some };
+    let stable = |partition| Options { warp: Warp::Stable, partition, ..some };
+    let size = |size| Options { size, ..some };
+    let cases = [
+        (size(Size::Budget(0)), "options.size"),
+        (size(Size::Budget((1 << 32) + 1)), "options.size"),
+        (size(Size::Exact([0, 5])), "options.size"),
+        (size(Size::Exact([5, 9000])), "options.size"),
+        (Options { align: 4, ..size(Size::Exact([6, 8])) }, "options.size"),
+        (size(Size::MaxError(0.0)), "options.size"),
+        (size(Size::MaxError(-1.0)), "options.size"),
+        (size(Size::MaxError(nan)), "options.size"),
+        (size(Size::MaxError(inf)), "options.size"),
+        (Options { max_side: 0, ..some }, "options.max_side"),
+        (Options { max_side: 65537, ..some }, "options.max_side"),
+        (Options { align: 0, ..some }, "options.align"),
+        (Options { align: 8193, ..some }, "options.align"),
+        (Options { warp: Warp::Lambda(0.0), ..some }, "options.warp.lambda"),
+        (Options { warp: Warp::Lambda(nan), ..some }, "options.warp.lambda"),
+        (Options { warp: Warp::Tsm { focus: Some(-1.0) }, ..some }, "options.warp.focus"),
+        (Options { warp: Warp::Tsm { focus: Some(inf) }, ..some }, "options.warp.focus"),
+        (slices(0), "options.partition.slices"),
+        (slices(17), "options.partition.slices"),
+        (overlap(-0.1), "options.partition.overlap"),
+        (overlap(1.1), "options.partition.overlap"),
+        (overlap(nan), "options.partition.overlap"),
+        (practical(-0.1), "options.partition.splits"),
+        (practical(1.1), "options.partition.splits"),
+        (practical(nan), "options.partition.splits"),
+        (at(&[1.0, 2.0]), "options.partition.splits"),
+        (at(&[1.0, 2.0, 2.0]), "options.partition.splits"),
+        (at(&[3.0, 2.0, 4.0]), "options.partition.splits"),
+        (at(&[0.0, 2.0, 4.0]), "options.partition.splits"),
+        (at(&[-1.0, 2.0, 4.0]), "options.partition.splits"),
+        (at(&[1.0, 2.0, inf]), "options.partition.splits"),
+        (stable(Partition { faces: Faces::Sides, ..four }), "options.partition.faces"),
+        (stable(Partition { splits: Splits::Fitted, ..four }), "options.partition.splits"),
+        (Options { size: Size::Exact([1, 64]), ..stable(four) }, "options.size"),
+        (Options { max_side: 1, ..stable(four) }, "options.size"),
+    ];
+    for (options, expected) in cases {
+        let result = Planner::new().plan(&camera, &[SUN], &Bounds::default(), &options).cloned();
+        assert_eq!(field(result), expected, "{options:?}");
+        // No light, no excuse.
+        let result = Planner::new().plan(&camera, &[], &Bounds::default(), &options).cloned();
+        assert_eq!(field(result), expected, "{options:?}");
+    }
+    // What is not used may be anything.
+    Planner::new().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
+}
+
+#[test]
+fn no_lights_need_no_maps() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let mut planner = Planner::new();
+    planner.plan(&camera, &[SUN], &Bounds::default(), &Options::default()).unwrap();
+    for size in [Size::Budget(1), Size::Exact([8, 8]), Size::MaxError(1e-9)] {
+        let options = Options { size, ..Options::default() };
+        let plan = planner.plan(&camera, &[], &Bounds::default(), &options).unwrap();
+        assert!(plan.maps.is_empty() && plan.lights.is_empty());
+        assert_eq!((plan.texels(), plan.storage_factor()), (0, 0.0));
+        assert_eq!(plan.lookup(0, VIEW.target).count(), 0);
+    }
+}
+
+/// Lights along the view, from behind and in front, lamps on the eye and at its corners, up along the view,
+/// narrow and huge ranges, all kinds of partitions, one-texel budgets, flat and point-like worlds: every
+/// plan is finite and within its budget, or the error says what cannot be had.
 #[test]
 fn odd_input_gives_sound_plans() {
     let view = (VIEW.target - VIEW.eye).normalize();
@@ -123,6 +204,11 @@ fn odd_input_gives_sound_plans() {
         Light::Spot(SPOT),
         Light::Spot(SpotLight { position: VIEW.eye, direction: view, ..SPOT }),
         Light::Spot(SpotLight { position: VIEW.target, direction: -view, ..SPOT }),
+        Light::Spot(SpotLight { near: 1e-12, range: 1e12, half_angle_rad: 1.48, ..SPOT }),
+        Light::Point(LAMP),
+        Light::Point(PointLight { position: VIEW.eye, ..LAMP }),
+        Light::Point(PointLight { position: VIEW.eye + view * VIEW.near, ..LAMP }),
+        Light::Point(PointLight { near: 1e-12, range: 1e12, ..LAMP }),
     ];
     let views = [
         VIEW,
@@ -142,49 +228,92 @@ fn odd_input_gives_sound_plans() {
         Bounds::of_scene(point),
         Bounds::of_scene(behind),
         Bounds::of_scene(Aabb::EMPTY),
-        Bounds { receivers: None, casters: Some(floor), ..Bounds::default() },
+        Bounds { casters: Some(floor), ..Bounds::default() },
+    ];
+    let at = |first: f64| Splits::At(std::array::from_fn(|i| first * (1.0 + 1e-9 * i as f64)));
+    let partitions = [
+        Partition::default(),
+        Partition::slices(16),
+        Partition { splits: Splits::Fitted, overlap: 1.0, ..Partition::slices(3) },
+        Partition { faces: Faces::SidesAndNear, ..Partition::slices(2) },
+        Partition { faces: Faces::Sides, splits: Splits::Practical(0.0), ..Partition::slices(3) },
+        // All before the near plane, and all beyond the far plane.
+        Partition { splits: at(1e-12), overlap: 0.5, ..Partition::slices(4) },
+        Partition { splits: at(9e11), faces: Faces::Sides, ..Partition::slices(4) },
+    ];
+    let sizes = [
+        Size::Budget(1),
+        Size::Budget(1 << 20),
+        Size::Exact([3, 5]),
+        Size::MaxError(3.0),
+        Size::MaxError(1e6),
     ];
     let mut planner = Planner::new();
+    // Every pair of a partition and a size in turn, for each warp.
+    let mut turn = 0;
     for look in views {
         let camera = Camera::look_at(look).unwrap();
         for light in lights {
             for bounds in worlds {
                 for (name, warp) in WARPS {
-                    for size in [Size::Budget(1), Size::Budget(1 << 20), Size::Exact([3, 5])] {
-                        let options = Options { size, ..options(warp) };
-                        let what = format!("{name} {size:?} {look:?} {light:?} {bounds:?}");
-                        let plan = planner.plan(&camera, &[light], &bounds, &options).expect(&what);
-                        assert_eq!(plan.maps.len(), 1);
-                        assert!(
-                            plan.lights[0].theta_rad.is_finite()
-                                && plan.storage_factor().is_finite(),
-                            "{what}"
-                        );
-                        let map = &plan.maps[0];
-                        assert!(map.shadow_from_local.is_finite(), "{what}");
-                        assert!(map.local_from_shadow.is_finite(), "{what}");
-                        assert!(map.shadow_from_local_f32().is_finite(), "{what}");
-                        assert!(map.lambda.is_none_or(|l| l > 0.0 && l.is_finite()), "{what}");
-                        let e = map.error;
-                        assert!(
-                            [e.max_s, e.max_t, e.max].iter().all(|e| e.is_finite()),
-                            "{what}: {e:?}"
-                        );
-                        match size {
-                            Size::Budget(budget) => assert!(map.texels() <= budget, "{what}"),
-                            Size::Exact(size) => assert!(map.is_empty() || map.resolution == size),
-                            Size::MaxError(px) => assert!(map.error.max <= px),
-                        }
-                        if map.is_empty() {
-                            assert!(
-                                bounds.receivers.is_some() || matches!(light, Light::Spot(_)),
-                                "{what}"
-                            );
-                            assert!(!map.may_cast(floor));
+                    turn += 1;
+                    for step in 0..2 {
+                        let partition = possible(partitions[(turn + step) % 7], warp);
+                        let size = sizes[(turn + 2 * step) % 5];
+                        let options = Options { size, partition, ..options(warp) };
+                        let what = format!("{name} {options:?} {look:?} {light:?} {bounds:?}");
+                        let maps = map_count(&partition, &light);
+                        let least = if warp == Warp::Stable { 4 } else { 1 };
+                        let is_too_small = size == Size::Budget(1) && maps * least > 1;
+                        match planner.plan(&camera, &[light], &bounds, &options) {
+                            Ok(plan) => {
+                                assert_eq!(plan.maps.len(), maps, "{what}");
+                                assert!(!is_too_small, "{what}");
+                                check_sound(plan, size, &what);
+                                let is_sun = matches!(light, Light::Directional { .. });
+                                let is_empty = plan.maps.iter().all(umbrage::ShadowMap::is_empty);
+                                assert!(
+                                    !(is_empty && is_sun && bounds.receivers.is_none()),
+                                    "{what}"
+                                );
+                            }
+                            result => {
+                                assert!(
+                                    is_too_small || matches!(size, Size::MaxError(_)),
+                                    "{what}: {result:?}"
+                                );
+                                assert_eq!(field(result), "options.size");
+                            }
                         }
                     }
                 }
             }
+        }
+    }
+}
+
+fn check_sound(plan: &Plan, size: Size, what: &str) {
+    assert!(plan.lights.iter().all(|l| l.theta_rad.is_finite()), "{what}");
+    assert!(plan.storage_factor().is_finite(), "{what}");
+    for map in &plan.maps {
+        assert!(map.shadow_from_local.is_finite(), "{what}");
+        assert!(map.local_from_shadow.is_finite(), "{what}");
+        assert!(map.shadow_from_local_f32().is_finite(), "{what}");
+        assert!(map.lambda.is_none_or(|l| l > 0.0 && l.is_finite()), "{what}");
+        assert!(map.split.iter().all(|d| d.is_finite()), "{what}");
+        let planes = map.cell.iter().chain(&map.caster_planes).chain(&map.fade_from);
+        for plane in planes {
+            assert!(plane.normal.is_normalized() && plane.offset.is_finite(), "{what}: {plane:?}");
+        }
+        let e = map.error;
+        assert!([e.max_s, e.max_t, e.max].iter().all(|e| e.is_finite()), "{what}: {e:?}");
+        match size {
+            Size::Budget(budget) => assert!(plan.texels() <= budget, "{what}"),
+            Size::Exact(size) => assert!(map.is_empty() || map.resolution == size, "{what}"),
+            Size::MaxError(pixels) => assert!(e.max <= pixels * (1.0 + 1e-9), "{what}"),
+        }
+        if map.is_empty() {
+            assert!(!map.may_cast(Aabb::new(DVec3::splat(-1e12), DVec3::splat(1e12))), "{what}");
         }
     }
 }
@@ -313,7 +442,8 @@ fn landmarks() {
         let plan = planner.plan(&camera, &[light], &Bounds::default(), &options(warp)).unwrap();
         let map = &plan.maps[0];
         let at = |x: f64, y: f64, z: f64| map.project(DVec3::new(x, y, z)).unwrap();
-        if warp != Warp::Unfocused {
+        // Nor does a map that stands still follow the view.
+        if !matches!(warp, Warp::Unfocused | Warp::Stable) {
             assert!(at(0.0, 0.0, -0.1).y.abs() < 1e-9, "{name}: near");
             assert!((at(0.0, 0.0, -100.0).y - 1.0).abs() < 1e-9, "{name}: far");
             assert!(at(0.0, 0.0, -3.0).y > at(0.0, 0.0, -2.0).y, "{name}");

@@ -2,23 +2,12 @@
 
 mod common;
 
-use common::{WARPS, config, options, partition, possible};
+use common::{WARPS, config, map_count, options, partition, possible};
 use proptest::prelude::*;
-use umbrage::{Aabb, Faces, Light, Objective, Options, Partition, Planner, Warp};
+use umbrage::{Aabb, Light, Objective, Options, Planner, Warp};
 
 fn numbers() -> impl Strategy<Value = Vec<[f64; 3]>> {
     proptest::collection::vec([0.0..=1.0f64, 0.0..=1.0, 0.0..=1.0], 24)
-}
-
-/// How many maps there must be.
-fn map_count(partition: &Partition, light: &Light) -> usize {
-    let slices = partition.slices as usize;
-    let maps = match partition.faces {
-        Faces::Whole => slices,
-        Faces::Sides => 4 * slices,
-        Faces::SidesAndNear => 4 * slices + 1,
-    };
-    if matches!(light, Light::Point(_)) { 6 * maps } else { maps }
 }
 
 proptest! {

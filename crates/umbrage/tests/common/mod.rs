@@ -107,6 +107,17 @@ pub(crate) fn possible(partition: Partition, warp: Warp) -> Partition {
     Partition { splits, faces: Faces::Whole, ..partition }
 }
 
+/// How many maps a light must have.
+pub(crate) fn map_count(partition: &Partition, light: &Light) -> usize {
+    let slices = partition.slices as usize;
+    let maps = match partition.faces {
+        Faces::Whole => slices,
+        Faces::Sides => 4 * slices,
+        Faces::SidesAndNear => 4 * slices + 1,
+    };
+    if matches!(light, Light::Point(_)) { 6 * maps } else { maps }
+}
+
 /// A direction anywhere, or within a hair of the view or of its opposite.
 fn sun(camera: Camera) -> impl Strategy<Value = Light> {
     prop_oneof![
