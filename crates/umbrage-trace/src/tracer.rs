@@ -199,7 +199,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// At most `limit` boxes that hold everything drawn between them, metres, world space: no single box's
-    /// air. They may overlap.
+    /// air. They may overlap. A `limit` of 0 counts as 1, for something must hold what is drawn; without
+    /// triangles there are none.
     ///
     /// The largest are opened first, down the trees that rays are traced with.
     pub fn boxes(&self, limit: usize) -> Vec<Aabb> {
@@ -242,10 +243,11 @@ impl<'a> Tracer<'a> {
         let mut closed = Vec::new();
         while let Some(largest) = opened.pop() {
             let parts = open(largest.what);
-            let fits = opened.len() + closed.len() + parts.len() <= limit;
-            if parts.is_empty() || !fits {
+            let fits = opened.len() + closed.len() + parts.len() <= limit.max(1);
+            if matches!(largest.what, What::Triangle) || !fits {
                 closed.push(largest.aabb);
             } else {
+                // None of an instance all of whose triangles are without area: it is not drawn.
                 opened.extend(parts);
             }
         }
