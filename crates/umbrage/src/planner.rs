@@ -176,7 +176,7 @@ impl Planner {
             let end = (to < f).then(|| along.plane_at(to, camera)).flatten();
             begin.into_iter().chain(end.map(Plane::flipped)).for_each(|p| slice.clip(p));
             self.trial.clear(camera);
-            let [s, t] = self.scratch.draft(&mut self.trial, slice, along, warp, request);
+            let [s, t] = self.scratch.draft(&mut self.trial, slice, along, warp, true, request);
             s * t
         });
         for i in 0..partition.slices as usize {
@@ -210,7 +210,7 @@ impl Planner {
                 Still::around(request.lamp, camera, range)
             });
             let unit = match &draft.still {
-                None => self.scratch.draft(map, &draft.body, along, warp, request),
+                None => self.scratch.draft(map, &draft.body, along, warp, false, request),
                 // Beyond the view nothing is ever served.
                 Some(_) if split[0] >= camera.far() || reach <= camera.near() => [0.0; 2],
                 Some(still) => still.unit_errors(),
@@ -264,13 +264,15 @@ struct Scratch {
 
 impl Scratch {
     /// Sets all of a map that does not depend on its resolution, and gives its largest errors in s and t
-    /// at one texel, pixels per texel; 0 without anything to serve.
+    /// at one texel, pixels per texel; 0 without anything to serve. A map that is only tried may be a
+    /// little worse.
     fn draft(
         &mut self,
         map: &mut ShadowMap,
         body: &Body,
         along: &Along,
         warp: Warp,
+        is_trial: bool,
         request: &Request<'_>,
     ) -> [f64; 2] {
         let Request { camera, lamp, .. } = *request;
@@ -326,8 +328,9 @@ impl Scratch {
             map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
         }
         // Under a spot light `adaptive` has chosen by samples. The promise not to be worse than
-        // `uniform` is kept by looking.
-        if warp == Warp::Adaptive(Objective::Storage) && space.apex.is_some() && nu > 0.0 {
+        // `uniform` is kept by looking, which takes too long for slices that are only tried.
+        let is_checked = !is_trial && space.apex.is_some() && nu > 0.0;
+        if warp == Warp::Adaptive(Objective::Storage) && is_checked {
             let mut storage = |nu: f64| {
                 set(map, family.homography(nu, covered));
                 let error = worst_errors(map, body, camera, worst);
