@@ -5,7 +5,10 @@
 use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Planner, SpotLight, Warp};
+use umbrage::{
+    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Planner, PointLight,
+    Size, Splits, SpotLight, Warp,
+};
 
 struct Counting;
 
@@ -33,7 +36,7 @@ static COUNTING: Counting = Counting;
 #[test]
 fn steady_frames_do_not_allocate() {
     let camera = |frame: u32| {
-        let a = f64::from(frame) * 0.1;
+        let a = f64::from(frame) * 0.6;
         let eye = DVec3::new(a.sin() * 10.0, 2.0, a.cos() * 10.0);
         Camera::look_at(LookAt {
             eye,
@@ -57,6 +60,7 @@ fn steady_frames_do_not_allocate() {
             near: 0.1,
             range: 50.0,
         }),
+        Light::Point(PointLight { position: DVec3::new(3.0, 4.0, -2.0), near: 0.1, range: 30.0 }),
     ];
     let warps = [
         Warp::Unfocused,
@@ -68,20 +72,37 @@ fn steady_frames_do_not_allocate() {
         Warp::Adaptive(Objective::Area),
         Warp::Log,
     ];
-    let mut planner = Planner::new();
-    let mut orbit = || {
-        for frame in 0..63 {
-            for light in &lights {
-                for warp in warps {
-                    let options = Options { warp, ..Options::default() };
-                    planner.plan(&camera(frame), &[*light], &bounds, &options).unwrap();
-                }
-            }
+    let four = Partition::slices(4);
+    let partitions = [
+        Partition::default(),
+        Partition { overlap: 0.2, ..four },
+        Partition { splits: Splits::Fitted, ..four },
+        Partition { faces: Faces::SidesAndNear, ..Partition::slices(2) },
+    ];
+    let mut cases: Vec<(&[Light], Options)> = Vec::new();
+    for warp in warps {
+        for partition in partitions {
+            // Fitting all sides of a point light takes long.
+            let count = if partition.splits == Splits::Fitted { 2 } else { 3 };
+            cases.push((&lights[..count], Options { warp, partition, ..Options::default() }));
         }
-    };
-    orbit();
-    let before = ALLOCATIONS.with(Cell::get);
-    assert!(before > 0, "the counter counts");
-    orbit();
-    assert_eq!(ALLOCATIONS.with(Cell::get), before);
+    }
+    let stable = Options { warp: Warp::Stable, partition: partitions[1], ..Options::default() };
+    let by_error = Options { size: Size::MaxError(20.0), partition: four, ..Options::default() };
+    cases.extend([(&lights[..], stable), (&lights[..], by_error)]);
+    for (lights, options) in cases {
+        let mut planner = Planner::new();
+        let mut orbit = || {
+            for frame in 0..11 {
+                planner.plan(&camera(frame), lights, &bounds, &options).unwrap();
+            }
+        };
+        // Buffers change places: it takes a few rounds until all have grown.
+        (0..3).for_each(|_| orbit());
+        let before = ALLOCATIONS.with(Cell::get);
+        assert!(before > 0, "the counter counts");
+        orbit();
+        let after = ALLOCATIONS.with(Cell::get);
+        assert_eq!(after, before, "{options:?}, {} lights", lights.len());
+    }
 }
