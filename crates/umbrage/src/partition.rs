@@ -135,7 +135,9 @@ impl Side {
         let towards = self.light.truncate() - p * self.light.w;
         let meets = p - towards * (normal.dot(p) / normal.dot(towards));
         let depth = camera.forward().dot(meets);
-        if depth.is_finite() && depth > 0.0 { depth } else { f64::INFINITY }
+        // Beams through the line from the eye to the light meet the face in the eye.
+        let is_before = depth > -1e-9 * p.length();
+        if depth.is_finite() && is_before { depth.max(0.0) } else { f64::INFINITY }
     }
 }
 
