@@ -5,9 +5,13 @@
 
 mod common;
 
-use common::{WARPS, options};
-use glam::{DVec2, DVec3};
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Planner, Warp};
+use common::{Config, WARPS, config, direction, options, possible};
+use glam::{DQuat, DVec2, DVec3};
+use proptest::prelude::*;
+use umbrage::{
+    Aabb, Bounds, Camera, Face, Faces, Light, LookAt, Objective, Options, Partition, Plan, Planner,
+    ShadowMap, Size, Splits, Warp,
+};
 
 struct Frame {
     eye: DVec3,
@@ -61,10 +65,53 @@ fn bounds() -> [(&'static str, Bounds<'static>); 3] {
     ]
 }
 
-/// Logarithms of width and height of the texel in the middle of the map.
-fn texel(planner: &mut Planner, motion: Motion, bounds: &Bounds, warp: Warp, t: f64) -> [f64; 2] {
-    let frame = motion.1(t);
-    let camera = Camera::look_at(LookAt {
+/// Logarithms of width and height of the texel in the middle of each map; `None` for empty maps.
+fn texels(plan: &Plan) -> Vec<Option<[f64; 2]>> {
+    let texel = |map: &ShadowMap| {
+        let middle = map.beam(DVec2::splat(0.5))?;
+        let footprint = map.footprint(middle.origin)?;
+        // A slice may dwindle to nothing, smoothly; how fast the logarithm falls then is no matter.
+        Some([footprint.base(), footprint.height()].map(|metres| (metres + 1e-6).ln()))
+    };
+    plan.maps.iter().map(|m| if m.is_empty() { None } else { texel(m) }).collect()
+}
+
+/// Largest change of any map that both have.
+fn change(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>]) -> f64 {
+    let both = a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+    both.map(|(a, b)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs())).fold(0.0, f64::max)
+}
+
+/// The largest jump along a motion cut into `steps`: a change within 1e-9 of it, and where. Changes of
+/// less than a per cent are none.
+fn largest_jump(steps: u32, mut at: impl FnMut(f64) -> Vec<Option<[f64; 2]>>) -> (f64, f64) {
+    let mut largest = (0.0, 0.0);
+    let mut before = at(0.0);
+    for i in 1..=steps {
+        let mut hi = f64::from(i) / f64::from(steps);
+        let mut lo = hi - 1.0 / f64::from(steps);
+        let after = at(hi);
+        let (mut at_lo, mut at_hi) = (before, after.clone());
+        while change(&at_lo, &at_hi) > 0.01 && hi - lo > 1e-9 {
+            let middle = lo.midpoint(hi);
+            let there = at(middle);
+            if change(&at_lo, &there) > change(&there, &at_hi) {
+                (hi, at_hi) = (middle, there);
+            } else {
+                (lo, at_lo) = (middle, there);
+            }
+        }
+        let jump = change(&at_lo, &at_hi);
+        if jump > 0.01 && jump > largest.0 {
+            largest = (jump, lo);
+        }
+        before = after;
+    }
+    largest
+}
+
+fn camera(frame: &Frame) -> Camera {
+    Camera::look_at(LookAt {
         eye: frame.eye,
         target: frame.target,
         up: DVec3::Y,
@@ -73,50 +120,171 @@ fn texel(planner: &mut Planner, motion: Motion, bounds: &Bounds, warp: Warp, t: 
         far: 120.0,
         image: [1280, 720],
     })
-    .unwrap();
-    let light = Light::Directional { direction: frame.sun };
-    let options = umbrage::Options { size: umbrage::Size::Exact([1024; 2]), ..options(warp) };
-    let plan = planner.plan(&camera, &[light], bounds, &options).unwrap();
-    let map = &plan.maps[0];
-    let middle = map.beam(DVec2::splat(0.5)).expect("a map that sees something");
-    let footprint = map.footprint(middle.origin).unwrap();
-    [footprint.base().ln(), footprint.height().ln()]
+    .unwrap()
+}
+
+fn assert_smooth(steps: u32, partition: Partition, warps: &[(&str, Warp)]) {
+    let mut planner = Planner::new();
+    for (motion, frame_at) in MOTIONS {
+        for (bounds_name, bounds) in bounds() {
+            for &(name, warp) in warps {
+                // For thin slices of a floor the least error of `adaptive` has two valleys now and then,
+                // and the lower one changes.
+                let is_thin = partition.slices > 1 && bounds_name == "floor";
+                if is_thin && matches!(warp, Warp::Adaptive(_)) {
+                    continue;
+                }
+                let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+                let (jump, at) = largest_jump(steps, |t| {
+                    let frame = frame_at(t);
+                    let light = Light::Directional { direction: frame.sun };
+                    texels(planner.plan(&camera(&frame), &[light], &bounds, &options).unwrap())
+                });
+                assert!(
+                    jump == 0.0,
+                    "{name} {partition:?}, {motion}, {bounds_name}: a texel jumps by {jump:.3} at {at}"
+                );
+            }
+        }
+    }
 }
 
 #[test]
 fn texels_change_size_without_jumps() {
-    const STEPS: u32 = 400;
+    assert_smooth(400, Partition::default(), &WARPS);
+}
+
+#[test]
+fn texels_of_slices_change_size_without_jumps() {
+    let four = Partition::slices(4);
+    assert_smooth(100, four, &WARPS);
+    assert_smooth(100, Partition { splits: Splits::Practical(0.5), ..four }, &WARPS);
+}
+
+#[test]
+fn texels_of_fitted_slices_change_size_without_jumps() {
+    let fitted = Partition { splits: Splits::Fitted, ..Partition::slices(4) };
+    let warps = [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage)];
+    assert_smooth(40, fitted, &warps.map(|warp| ("fitted", warp)));
+}
+
+/// Maps of faces change from front to back faces of the view where the light passes at right angles:
+/// the faces that serve are others, and so are texels. Nowhere else does a texel jump, whatever face turns
+/// edge-on.
+#[test]
+fn faces_jump_at_right_angles_only() {
+    let camera = camera(&Frame { eye: EYE, target: TARGET, sun: DVec3::ZERO });
+    let (forward, up, right) = (camera.forward(), camera.up(), camera.right());
     let mut planner = Planner::new();
-    for motion in MOTIONS {
-        for (bounds_name, bounds) in bounds() {
-            for (name, warp) in WARPS {
-                let mut at = |t: f64| texel(&mut planner, motion, &bounds, warp, t);
-                let change =
-                    |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
-                let mut before = at(0.0);
-                for i in 1..=STEPS {
-                    let mut hi = f64::from(i) / f64::from(STEPS);
-                    let mut lo = hi - 1.0 / f64::from(STEPS);
-                    let after = at(hi);
-                    let (mut at_lo, mut at_hi) = (before, after);
-                    // A per cent within 1e-9 of the motion is a jump.
-                    while change(at_lo, at_hi) > 0.01 && hi - lo > 1e-9 {
-                        let middle = lo.midpoint(hi);
-                        let there = at(middle);
-                        if change(at_lo, there) > change(there, at_hi) {
-                            (hi, at_hi) = (middle, there);
-                        } else {
-                            (lo, at_lo) = (middle, there);
-                        }
-                    }
-                    let jump = change(at_lo, at_hi);
-                    assert!(
-                        jump <= 0.01,
-                        "{name}, {}, {bounds_name}: a texel jumps by {jump:.3} at {lo}",
-                        motion.0
-                    );
-                    before = after;
+    for side in [0.0, 0.06, 0.5, 2.0] {
+        for (name, warp) in WARPS {
+            for (bounds_name, bounds) in bounds() {
+                let partition = Partition { faces: Faces::Sides, ..Partition::slices(2) };
+                let is_thin = matches!(warp, Warp::Adaptive(_)) && bounds_name == "floor";
+                if warp == Warp::Stable || is_thin {
+                    continue;
                 }
+                let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+                // From behind over the head to the front, from 0 to 1.
+                let mut plan = |t: f64| {
+                    let (sin, cos) = (std::f64::consts::PI * t).sin_cos();
+                    let direction = forward * cos - up * sin + right * (side * sin);
+                    let light = Light::Directional { direction };
+                    planner.plan(&camera, &[light], &bounds, &options).unwrap().clone()
+                };
+                let right_angle = 0.5;
+                for (from, to) in [(1e-3, right_angle - 1e-9), (right_angle + 1e-9, 1.0 - 1e-3)] {
+                    let (jump, at) = largest_jump(100, |t| texels(&plan(from + (to - from) * t)));
+                    assert!(
+                        jump == 0.0,
+                        "{name}, side {side}, {bounds_name}: a texel jumps by {jump:.3} at {at} of {from}"
+                    );
+                }
+                let serves = |plan: &Plan, face| {
+                    plan.maps.iter().any(|m| m.part.face == Some(face) && !m.is_empty())
+                };
+                let (before, after) = (plan(right_angle - 1e-9), plan(right_angle + 1e-9));
+                assert!(serves(&before, Face::Top) && !serves(&before, Face::Bottom), "{name}");
+                assert!(!serves(&after, Face::Top) && serves(&after, Face::Bottom), "{name}");
+            }
+        }
+    }
+}
+
+/// A millionth of a radian.
+const SMALL: f64 = 1e-6;
+
+/// The same view and light after a motion of this size: of the eye, of the view, or of the light.
+fn moved(config: &Config, which: usize, step: DVec3, axis: DVec3) -> (Camera, Light) {
+    let turn = |d: DVec3| DQuat::from_axis_angle(axis, SMALL) * d;
+    let step = step * SMALL * config.camera.near();
+    let (mut eye, mut forward) = (config.camera.eye(), config.camera.forward());
+    let (mut up, mut light) = (config.camera.up(), config.light);
+    match which {
+        0 => eye += step,
+        1 => (forward, up) = (turn(forward), turn(up)),
+        _ => match &mut light {
+            Light::Directional { direction } => *direction = turn(*direction),
+            Light::Spot(spot) => {
+                spot.position += step;
+                spot.direction = turn(spot.direction);
+            }
+            Light::Point(point) => point.position += step,
+        },
+    }
+    let camera = Camera::look_at(LookAt {
+        eye,
+        target: eye + forward,
+        up,
+        fov_y_rad: 2.0 * config.camera.tan_half_fov_y().atan(),
+        near: config.camera.near(),
+        far: config.camera.far(),
+        image: config.camera.image(),
+    });
+    (camera.unwrap(), light)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 6000, max_global_rejects: 60_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Moving by a millionth of the near distance, or turning by a millionth of a radian, changes no
+    /// texel's width or height by more than two in a thousand.
+    /// But for maps of the whole view or its near face, where it misses the light's way by less than a
+    /// thousandth of a radian: they turn with the direction by which it does.
+    #[test]
+    fn small_motions_make_small_changes(
+        config in config(),
+        (step, axis) in (direction(), direction()),
+        pick in 0..WARPS.len(),
+        which in 0..3usize,
+        slices in prop_oneof![Just(1u32), Just(4)],
+        faces in prop_oneof![Just(Faces::Whole), Just(Faces::Sides), Just(Faces::SidesAndNear)],
+        numbers in proptest::collection::vec([0.0..1.0f64, 0.0..1.0, 0.0..1.0], 8),
+    ) {
+        // Far from the world's origin so small a motion is lost in rounding.
+        prop_assume!(config.camera.eye().length() < 1e3);
+        let (name, warp) = WARPS[pick];
+        let partition = possible(Partition { faces, ..Partition::slices(slices) }, warp);
+        let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+        let plan = |camera, light| {
+            Planner::new().plan(&camera, &[light], &config.bounds, &options).unwrap().clone()
+        };
+        let (camera, light) = moved(&config, which, step, axis);
+        let (before, after) = (plan(config.camera, config.light), plan(camera, light));
+        let theta = before.lights[0].theta_rad;
+        let is_along_light = theta.sin() < 1e-3;
+        let switches = partition.faces != Faces::Whole && theta.cos().abs() < 1e-5;
+        prop_assume!(!switches);
+        for p in config.seen_points(&numbers) {
+            for (i, _) in before.lookup(0, p) {
+                let is_side = before.maps[i].part.face.is_some_and(|face| face != Face::Near);
+                let turns = is_along_light && !is_side;
+                if turns || after.lookup(0, p).all(|(j, _)| i != j) {
+                    continue;
+                }
+                let [a, b] = [&before, &after].map(|plan| plan.maps[i].footprint(p).unwrap());
+                let change = (b.base() / a.base()).ln().abs().max((b.height() / a.height()).ln().abs());
+ prop_assert!(change < 0.002, "{name} {partition:?}: {change} at {p}");
             }
         }
     }
