@@ -111,7 +111,7 @@ pub struct Measured {
     pub casters_culled: Option<f64>,
     /// Share of what counts in two frames whose shadow changes from one to the next although the truth
     /// does not; `None` if nothing moved.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flicker: Option<f64>,
     /// Wall-clock times.
     pub ms: Times,
@@ -224,7 +224,6 @@ pub(crate) mod tests {
             "error_px": {"p50": 0.1 + 0.2, "p95": 2.0, "max": 3.5, "undefined": 7},
             "storage_factor": 865.16,
             "casters_culled": 0.25,
-            "flicker": null,
             "ms": {"plan": 0.004, "depth": 812.5, "filter": null, "shade": 95.25},
         });
         assert_eq!(json["results"], json!([expected]));

@@ -173,7 +173,7 @@ fn the_texels_that_an_error_takes_are_told() {
     assert_eq!((run.code, run.stdout.as_str()), (0, ""), "{}", run.stderr);
     let told = run.stderr.lines().find_map(|l| l.strip_prefix("texels: ")).unwrap();
     assert!(told.ends_with(" for at most 2 px a texel"), "{told}");
-    let plan = "plan pole --json --size 96x54 --shadows uniform+z2 --max-error 2";
+    let plan = "plan pole --fit surfaces --json --size 96x54 --shadows uniform+z2 --max-error 2";
     let plan = desk.json(&plan.split(' ').collect::<Vec<_>>());
     assert_eq!(told.split(' ').next().unwrap(), plan["texels"].to_string());
 }
