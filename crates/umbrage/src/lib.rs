@@ -8,6 +8,8 @@
 //! The crate is pure: no GPU, no files, no `unsafe`, no global state, and no allocation in a steady
 //! frame. Same input, same output.
 //!
+//! [`theory`] has the closed forms of the papers behind it.
+//!
 //! # Conventions
 //!
 //! All of them, stated once:
@@ -43,6 +45,7 @@ mod plan;
 mod planner;
 mod resolution;
 mod stable;
+pub mod theory;
 pub mod visibility;
 mod warp;
 mod worst;

@@ -1,0 +1,163 @@
+use super::{Tilted, View, check_lambda};
+use crate::error::{Error, check};
+use crate::options::Objective;
+
+/// What a technique asks of λ: a rule for the warp of a view under light at any angle θ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Rule {
+    /// No warp: λ = ∞.
+    Uniform,
+    /// Perspective shadow maps (Stamminger and Drettakis 2002). With light in the plane of the view they are
+    /// one-point perspectives too; λ = n at θ = 90°. As in [`Warp::Psm`](crate::Warp::Psm) the map
+    /// looks along the middle of the narrowest cone around V, after the viewer's perspective.
+    Psm,
+    /// Light space perspective shadow maps as published: λ = (n + √(n f))/sin θ (Wimmer et al. 2004, §4.4).
+    Lispsm,
+    /// The same with their advice for views tilted to the light, to take n + μ sin θ for f where that is
+    /// nearer. What [`Warp::Lispsm`](crate::Warp::Lispsm) does.
+    LispsmInRange,
+    /// Trapezoidal shadow maps (Martin and Tan 2004, as Lloyd et al. 2006 describe them): what is nearer than
+    /// the focus gets 80% of the rows. No warp where the focus lies before W, or beyond 80% of
+    /// its range. [`Warp::Tsm`](crate::Warp::Tsm) limits the warp moreover.
+    Tsm {
+        /// View distance, metres, > 0; `None`: √(n f).
+        focus: Option<f64>,
+    },
+    /// The least [storage](Objective::Storage), M_q·M_p, or worst [area](Objective::Area), max E_q·E_p, that any
+    /// λ gives.
+    Adaptive(Objective),
+    /// Logarithmic rows behind the warp λ = n/sin θ. Their error along the map is
+    /// [`Warped::log_error`](super::Warped::log_error), not E_p.
+    Log,
+    /// λ as told: metres, at least 1e-12, or infinite for no warp.
+    Lambda(f64),
+}
+
+impl Tilted {
+    /// λ of a technique, metres; infinite for no warp.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`] with the field `theory.lambda` or `theory.focus` for a rule's own number.
+    pub fn lambda(&self, rule: Rule) -> Result<f64, Error> {
+        let View { near: n, far: f, .. } = self.view;
+        Ok(match rule {
+            Rule::Uniform => f64::INFINITY,
+            Rule::Psm => self.psm(),
+            Rule::Lispsm => self.view.lambda_l() / self.sin,
+            Rule::LispsmInRange => {
+                let range = (f - n).min(self.mu() * self.sin);
+                (n + (n * (n + range)).sqrt()) / self.sin
+            }
+            Rule::Tsm { focus } => {
+                let focus = focus.unwrap_or((n * f).sqrt());
+                check(focus > 0.0 && focus.is_finite(), "theory.focus", || {
+                    format!("must be a positive, finite distance, is {focus}")
+                })?;
+                self.tsm(focus)
+            }
+            Rule::Adaptive(objective) => self.adaptive(objective),
+            Rule::Log => n / self.sin,
+            Rule::Lambda(lambda) => {
+                check_lambda(lambda)?;
+                lambda
+            }
+        })
+    }
+
+    /// The λ with t(δ) = 0.8, where δ is the distance of the focus from W's near plane.
+    fn tsm(&self, focus: f64) -> f64 {
+        let delta = self.behind_near_plane(0.0, focus);
+        let mu = self.mu();
+        let lambda = 0.2 * mu * delta / (0.8 * mu - delta);
+        // Rounding could leave too short a λ where the focus touches W's near plane.
+        if delta < 0.8 * mu && check_lambda(lambda).is_ok() { lambda } else { f64::INFINITY }
+    }
+
+    /// The λ of least M_q·M_p or least max E_q·E_p (the direction-adaptive optimum that Theory's conclusion asks for).
+    ///
+    /// With u = 1/λ and z_w = λ (1 + d u), d of V's lower near and far corners and of its upper far corner being
+    /// a, μ and b, the cost at the near corner is g = (1 + a u)³/((1 + b u)(1 + μ u)) up to a factor, at the far
+    /// corner one that grows with u because μ ≥ b. Where the largest error changes from the near to the far
+    /// corner, (1 + a u)/(1 + μ u) = ρ = (n/f)^e with e = 1/2 for storage and 2/3 for area. So the least cost
+    /// is there or at the minimum of g, whichever comes first.
+    ///
+    /// For f/n > 9 and θ ≥ φ it is there, and storage has
+    /// λ* = (μ − 2√(n f) tan φ cos θ)/(√(f/n) − 1) = (n + √(n f)) sin θ + (√(n f) − n) tan φ cos θ. Overhead every λ from n to
+    /// λ_L needs the same storage, and λ* = λ_L.
+    fn adaptive(&self, objective: Objective) -> f64 {
+        let View { near: n, far: f, .. } = self.view;
+        let t = self.tan_phi * self.cos;
+        let sin = self.sin;
+        let is_steep = self.first == n;
+        // λ where near and far corner are as bad: (μ − a/ρ)/(1/ρ − 1), the difference between f and n
+        // cancelled from it. Not positive where the near corner is worse with any warp.
+        let equal = match objective {
+            Objective::Storage => {
+                let g = (f / n).sqrt();
+                if is_steep {
+                    n * ((g + 1.0) * sin + (g - 1.0) * t)
+                } else {
+                    n * g * ((g + 1.0) * sin - (g - 1.0) * t)
+                }
+            }
+            Objective::Area => {
+                let g = (f / n).cbrt();
+                let (plus, minus) = (g * g + g + 1.0, g * g + g - 1.0);
+                if is_steep {
+                    n * (plus * sin + (minus - 2.0 * g) * t) / (g + 1.0)
+                } else {
+                    n * g * g * (plus * sin - minus * t) / (g + 1.0)
+                }
+            }
+        };
+        // In units of μ, as f may be anything.
+        let mu = self.mu();
+        let a = self.behind_near_plane(-n * self.tan_phi, n) / mu;
+        let b = self.behind_near_plane(f * self.tan_phi, f) / mu;
+        // g falls where A u² + 2 B u + C < 0. C ≥ 0 makes B ≥ 0, so g then grows from u = 0 on.
+        let (qa, qb, qc) = (a * b, a * (b + 1.0) - b, 3.0 * a - b - 1.0);
+        if qc >= 0.0 {
+            return f64::INFINITY;
+        }
+        let root = (qb * qb - qa * qc).sqrt();
+        // 1/u of the positive root, the stable way for either sign of B.
+        let lowest = if qb >= 0.0 { (qb + root) / -qc } else { qa / (root - qb) };
+        (lowest * mu).max(equal)
+    }
+
+    /// λ of the true perspective shadow map.
+    ///
+    /// After the viewer's perspective V is the box |x|, |y| ≤ 1, 0 ≤ z ≤ 1, and the light a point. The narrowest
+    /// cone around the box's corners from there has its axis A in the plane of symmetry, towards the point
+    /// nearest the light among the mixtures of the corners' unit vectors. Distance along A is
+    /// proportional to z sin θ − y cos θ + c in V, with c = (A_z/A_y) tan φ cos θ n f/(f − n).
+    fn psm(&self) -> f64 {
+        let View { near: n, far: f, .. } = self.view;
+        let per_depth = f / (f - n);
+        let corner = |y: f64, z: f64| {
+            let [y, z] = [y * self.cos - self.sin / self.tan_phi, (z - per_depth) * self.cos];
+            let length = (self.cos * self.cos + y * y + z * z).sqrt();
+            [y / length, z / length]
+        };
+        let corners = [corner(-1.0, 0.0), corner(1.0, 0.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
+        let pairs = corners.iter().flat_map(|a| corners.iter().map(move |b| nearest(*a, *b)));
+        let squared = |[y, z]: &[f64; 2]| y * y + z * z;
+        let [y, z] = pairs.min_by(|a, b| squared(a).total_cmp(&squared(b))).unwrap_or(corners[0]);
+        // Light along the view lies on the axis of symmetry, and so does A. No warp.
+        if y >= 0.0 {
+            return f64::INFINITY;
+        }
+        self.first * self.upper_slope() + z / y * self.tan_phi * self.cos * n * per_depth
+    }
+}
+
+/// The point nearest the origin on the line from `a` to `b`.
+fn nearest(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    let [dy, dz] = [b[0] - a[0], b[1] - a[1]];
+    let squared = dy * dy + dz * dz;
+    let share = if squared > 0.0 { -(a[0] * dy + a[1] * dz) / squared } else { 0.0 };
+    let share = share.clamp(0.0, 1.0);
+    [a[0] + share * dy, a[1] + share * dz]
+}

@@ -1,0 +1,126 @@
+use crate::error::{Error, check};
+use std::f64::consts::PI;
+
+/// The shadow test of convolution shadow maps: a step from 0 to 1, as a truncated Fourier series (Annen et al. 2007,
+/// Eqs. 10 to 14).
+///
+/// With a receiver at depth d and the occluder stored at depth z, both linear in 0 ..= 1,
+/// f(d, z) = 1/2 + 2 Σ_{k=1..M} exp(−α (k/M)²)/c_k · sin(c_k (z − d)), c_k = π (2k − 1), is about 1 where d ≤ z: lit.
+/// The paper defines f so but expands the step of d − z, with which light and shadow change places.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FourierStep {
+    order: u32,
+    attenuation: f64,
+}
+
+/// Where the series is evaluated. At d = z itself it is 1/2, which would leave lit surfaces half dark (§3.2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepAt {
+    /// Take d − [`o_M`](FourierStep::offset) for d.
+    pub offset: bool,
+    /// Double the sum.
+    pub scale: bool,
+}
+
+impl FourierStep {
+    /// The largest order M.
+    pub const MAX_ORDER: u32 = 1024;
+
+    /// From the number of terms M, 1 ..= [`MAX_ORDER`](Self::MAX_ORDER), and the strength α of the attenuation
+    /// against ringing, ≥ 0 and finite, 0 for none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`] with the field `theory.order` or `theory.attenuation`.
+    pub fn new(order: u32, attenuation: f64) -> Result<Self, Error> {
+        check((1..=Self::MAX_ORDER).contains(&order), "theory.order", || {
+            format!("must be 1 to {}, is {order}", Self::MAX_ORDER)
+        })?;
+        check(attenuation >= 0.0 && attenuation.is_finite(), "theory.attenuation", || {
+            format!("must be finite and not negative, is {attenuation}")
+        })?;
+        Ok(Self { order, attenuation })
+    }
+
+    /// Terms as (c_k, coefficient of the sine).
+    fn terms(self) -> impl Iterator<Item = (f64, f64)> {
+        let order = f64::from(self.order);
+        (1..=self.order).map(f64::from).map(move |k| {
+            let c = PI * (2.0 * k - 1.0);
+            (c, 2.0 / c * (-self.attenuation * (k / order).powi(2)).exp())
+        })
+    }
+
+    /// The series at x = z − d, as it is: with ringing, and beyond 0 and 1. Its period is 2, so that it is a
+    /// step for |x| < 1 only.
+    pub fn series(&self, x: f64) -> f64 {
+        0.5 + self.terms().map(|(c, amount)| amount * (c * x).sin()).sum::<f64>()
+    }
+
+    fn slope(&self, x: f64) -> f64 {
+        self.terms().map(|(c, amount)| amount * c * (c * x).cos()).sum()
+    }
+
+    /// The offset o_M: the least x ≥ 0 at which the series reaches 1. With so much attenuation that it never does,
+    /// the x at which it comes nearest to 1.
+    pub fn offset(&self) -> f64 {
+        // The series is symmetric about x = 1/2. The shortest of its waves is sampled 32 times, so that no
+        // peak lies hidden between two samples.
+        let samples = 16 * self.order;
+        let place = |i: u32| 0.5 * f64::from(i) / f64::from(samples);
+        let mut peak = (0.0, self.series(0.0));
+        for i in 1..=samples {
+            let (begin, end) = (place(i - 1), place(i));
+            let value = self.series(end);
+            let top = if self.slope(begin) > 0.0 && self.slope(end) < 0.0 {
+                let top = bisect(begin, end, |x| self.slope(x) < 0.0);
+                (top, self.series(top))
+            } else {
+                (end, value)
+            };
+            if top.1 >= 1.0 {
+                return bisect(begin, top.0, |x| self.series(x) >= 1.0);
+            }
+            if top.1 > peak.1 {
+                peak = top;
+            }
+        }
+        peak.0
+    }
+
+    /// How much light reaches a receiver at depth d past an occluder at depth z, both in 0 ..= 1: the series where
+    /// `at` says, clamped to 0 ..= 1.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`] with the field `theory.receiver` or `theory.occluder`, also where the two are 1 apart,
+    /// which is half the series' period.
+    pub fn visibility(&self, receiver: f64, occluder: f64, at: StepAt) -> Result<f64, Error> {
+        for (depth, field) in [(receiver, "theory.receiver"), (occluder, "theory.occluder")] {
+            check((0.0..=1.0).contains(&depth), field, || {
+                format!("must be a depth of 0 to 1, is {depth}")
+            })?;
+        }
+        let apart = occluder - receiver;
+        check(apart.abs() < 1.0, "theory.receiver", || {
+            "must be less than 1 from the occluder, half the series' period".into()
+        })?;
+        let x = if at.offset { apart + self.offset() } else { apart };
+        let scale = if at.scale { 2.0 } else { 1.0 };
+        Ok((scale * self.series(x)).clamp(0.0, 1.0))
+    }
+}
+
+/// Where between `lo`, at which it does not hold, and `hi`, at which it does, a condition begins to hold.
+fn bisect(mut lo: f64, mut hi: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    // 60 halvings leave no digits of a double.
+    for _ in 0..60 {
+        let middle = lo.midpoint(hi);
+        if holds(middle) {
+            hi = middle;
+        } else {
+            lo = middle;
+        }
+    }
+    hi
+}
