@@ -1,0 +1,130 @@
+//! Culling of casters against brute force: whatever is hit on the way from a receiver to the light.
+
+mod common;
+
+use common::{Config, WARPS, config, direction, map_count, options, partition, possible};
+use glam::DVec3;
+use proptest::prelude::*;
+use std::cell::Cell;
+use umbrage::{Aabb, Light, Options, Planner};
+
+/// Where the way from `p` to the light ends, in lengths of the vector given; parallel light's goes on.
+fn way_to_light(light: &Light, p: DVec3) -> (DVec3, f64) {
+    match light {
+        Light::Directional { direction } => (-*direction, f64::INFINITY),
+        Light::Spot(spot) => (spot.position - p, 1.0),
+        Light::Point(point) => (point.position - p, 1.0),
+    }
+}
+
+/// Whether the ray from `p` along `way` hits the box before `end` (slabs).
+fn hits_box(aabb: Aabb, p: DVec3, way: DVec3, end: f64) -> bool {
+    let (mut enter, mut leave) = (0.0f64, end);
+    for axis in 0..3 {
+        let [lo, hi] = [aabb.min[axis], aabb.max[axis]].map(|side| (side - p[axis]) / way[axis]);
+        if way[axis] == 0.0 {
+            if p[axis] < aabb.min[axis] || p[axis] > aabb.max[axis] {
+                return false;
+            }
+        } else {
+            enter = enter.max(lo.min(hi));
+            leave = leave.min(lo.max(hi));
+        }
+    }
+    enter < leave
+}
+
+/// Whether the ray from `p` along `way` hits the triangle before `end` (Möller and Trumbore 1997).
+fn hits_triangle([a, b, c]: [DVec3; 3], p: DVec3, way: DVec3, end: f64) -> bool {
+    let (ab, ac) = (b - a, c - a);
+    let det = ab.dot(way.cross(ac));
+    let to_p = p - a;
+    let u = to_p.dot(way.cross(ac)) / det;
+    let v = way.dot(to_p.cross(ab)) / det;
+    let t = ac.dot(to_p.cross(ab)) / det;
+    u > 0.0 && v > 0.0 && u + v < 1.0 && t > 0.0 && t < end
+}
+
+/// Things that stand about the scene: a place and three vectors of a size.
+fn things() -> impl Strategy<Value = Vec<([f64; 3], [DVec3; 3], f64, bool)>> {
+    let place = [-1.0..2.0f64, -1.0..2.0, -1.0..2.0];
+    let size = (-7.0..1.0f64).prop_map(f64::exp);
+    let shape = [direction(), direction(), direction()];
+    proptest::collection::vec((place, shape, size, any::<bool>()), 24)
+}
+
+/// Middle and size of a box around what is seen.
+fn seen(config: &Config) -> (DVec3, f64) {
+    let around = Aabb::around(config.corners());
+    (config.camera.eye() + around.center(), around.size().length())
+}
+
+#[test]
+fn whatever_is_hit_may_cast() {
+    let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
+        cases: 3_000,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    });
+    let numbers = proptest::collection::vec([0.0..=1.0f64, 0.0..=1.0, 0.0..=1.0], 8);
+    let input = (config(), partition(), numbers, things(), 0..WARPS.len());
+    let [hits, asked, culled] = [const { Cell::new(0u64) }; 3];
+    let count = |cell: &Cell<u64>, n: u64| cell.set(cell.get() + n);
+    runner
+        .run(&input, |(config, partition, numbers, things, pick)| {
+            let (name, warp) = WARPS[pick];
+            let partition = possible(partition, warp);
+            let options = Options { partition, ..options(warp) };
+            // Millions of boxes are enough.
+            prop_assume!(
+                map_count(&partition, &config.light) <= 100 && config.corners().len() >= 4
+            );
+            let mut planner = Planner::new();
+            let plan =
+                planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+            let receivers = config.seen_points(&numbers);
+            let (middle, size) = seen(&config);
+            for (i, (place, shape, scale, is_triangle)) in things.into_iter().enumerate() {
+                // Half of the things stand on some receiver's way to the light, off to the side by about their
+                // own size; half are anywhere.
+                let scale = scale * size;
+                let anywhere = middle + (DVec3::from(place) - 0.5) * size;
+                let center = match receivers.get(i) {
+                    Some(&p) => {
+                        let (way, end) = way_to_light(&config.light, p);
+                        let reach = if end.is_finite() { way.length() } else { 2.0 * size };
+                        let k = (place[0] + 1.0) / 3.0;
+                        p + way.normalize() * (reach * k) + shape[0] * (scale * place[1])
+                    }
+                    None => anywhere,
+                };
+                let corners = shape.map(|d| center + d * scale);
+                let aabb = Aabb::around(corners);
+                for map in plan.maps.iter().filter(|m| !m.is_empty()) {
+                    count(&asked, 1);
+                    count(&culled, u64::from(!map.may_cast(aabb)));
+                }
+                for &p in &receivers {
+                    let (way, end) = way_to_light(&config.light, p);
+                    let hit = if is_triangle {
+                        hits_triangle(corners, p, way, end)
+                    } else {
+                        hits_box(aabb, p, way, end)
+                    };
+                    for (index, _) in plan.lookup(0, p).filter(|_| hit) {
+                        count(&hits, 1);
+                        prop_assert!(
+                            plan.maps[index].may_cast(aabb),
+                            "{name} {partition:?}: {aabb:?} hides the light from {p}"
+                        );
+                    }
+                }
+            }
+            Ok(())
+        })
+        .unwrap();
+    let (hits, asked, culled) = (hits.get(), asked.get(), culled.get());
+    let share = culled as f64 / asked as f64;
+    println!("{hits} hits; {share:.3} of {asked} pairs of a thing and a map are culled");
+    assert!(hits > 10_000 && share > 0.5, "{hits} hits, {share} culled");
+}
