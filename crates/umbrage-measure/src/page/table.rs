@@ -45,8 +45,10 @@ const fn column(
 /// The columns that have something to show of these results.
 pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
     // Times differ by more than techniques do from one run to the next: no laurels for these.
-    let time = |c: Column| Column { smaller_is_better: false, always: false, ..c };
-    let whole = |c: Column| Column { smaller_is_better: false, text: |v| count(v as u64), ..c };
+    let rare = |c: Column| Column { always: false, ..c };
+    let unjudged = |c: Column| Column { smaller_is_better: false, ..c };
+    let time = |c: Column| rare(unjudged(c));
+    let whole = |c: Column| unjudged(Column { text: |v| count(v as u64), ..c });
     let share = |c: Column| Column { text: percent, ..c };
     let columns = [
         share(column(
@@ -79,15 +81,18 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
             "Texels needed per pixel for an error of one pixel per texel",
             |r| r.storage_factor,
         ),
-        share(column("Culled", "%", "Triangles that need not be drawn into a map", |r| {
-            r.casters_culled
-        })),
-        share(column(
+        rare(unjudged(share(column(
+            "Culled",
+            "%",
+            "Triangles that need not be drawn into a map",
+            |r| r.casters_culled,
+        )))),
+        rare(share(column(
             "Flicker",
             "%",
             "Points whose shadow changes between frames although the truth does not",
             |r| r.flicker,
-        )),
+        ))),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
         whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
         time(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),
