@@ -1,10 +1,15 @@
-//! Time to plan one map, by warp.
+//! Time to plan the maps of one light, by warp and partition.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use std::hint::black_box;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Planner, Warp};
+use umbrage::{
+    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Planner, Splits,
+    Warp,
+};
+
+const ADAPTIVE: Warp = Warp::Adaptive(Objective::Storage);
 
 fn plan(c: &mut Criterion) {
     let camera = Camera::look_at(LookAt {
@@ -20,16 +25,26 @@ fn plan(c: &mut Criterion) {
     let light = Light::Directional { direction: DVec3::new(-0.58, -0.71, -0.41) };
     let scene = Aabb::new(DVec3::new(-41.0, 0.0, -52.0), DVec3::new(41.0, 5.3, 52.0));
     let bounds = Bounds::of_scene(scene);
-    let mut group = c.benchmark_group("plan one map");
-    for (name, warp) in [
-        ("uniform", Warp::Uniform),
-        ("psm", Warp::Psm),
-        ("lispsm", Warp::Lispsm),
-        ("tsm", Warp::Tsm { focus: None }),
-        ("adaptive", Warp::Adaptive(Objective::Storage)),
-        ("adaptive(area)", Warp::Adaptive(Objective::Area)),
+    let one = Partition::default();
+    let four = Partition::slices(4);
+    let fitted = Partition { splits: Splits::Fitted, ..four };
+    let faces = Partition { faces: Faces::SidesAndNear, ..one };
+    let mut group = c.benchmark_group("plan");
+    for (name, warp, partition) in [
+        ("uniform", Warp::Uniform, one),
+        ("psm", Warp::Psm, one),
+        ("lispsm", Warp::Lispsm, one),
+        ("tsm", Warp::Tsm { focus: None }, one),
+        ("adaptive", ADAPTIVE, one),
+        ("adaptive(area)", Warp::Adaptive(Objective::Area), one),
+        ("uniform+z4", Warp::Uniform, four),
+        ("lispsm+z4", Warp::Lispsm, four),
+        ("adaptive+z4", ADAPTIVE, four),
+        ("adaptive+z4(fitted)", ADAPTIVE, fitted),
+        ("adaptive+face", ADAPTIVE, faces),
+        ("stable+z4", Warp::Stable, four),
     ] {
-        let options = Options { warp, ..Options::default() };
+        let options = Options { warp, partition, ..Options::default() };
         let mut planner = Planner::new();
         group.bench_function(name, |b| {
             b.iter(|| {
