@@ -66,6 +66,23 @@ impl Tilted {
         })
     }
 
+    /// How many times the texels another rule needs that the [least-storage](Objective::Storage) warp needs for
+    /// the same guaranteed error: the ratio of their M_q·M_p, at least 1. Over
+    /// [`Rule::Lispsm`] it is 1 overhead and grows as light and view close in on each other
+    /// (n = 1, f = 100, φ = 30°: 1.08 at θ = 60°, 1.8 at 31°).
+    ///
+    /// # Errors
+    ///
+    /// As [`lambda`](Self::lambda) and [`warped`](Self::warped); and with the field `theory.rule` for
+    /// [`Rule::Log`], whose rows no λ gives.
+    pub fn adaptive_gain(&self, over: Rule) -> Result<f64, Error> {
+        check(over != Rule::Log, "theory.rule", || {
+            "logarithmic rows cannot be compared by λ alone".into()
+        })?;
+        let storage = |rule| Ok(self.warped(self.lambda(rule)?)?.extrema().storage_factor());
+        Ok(storage(over)? / storage(Rule::Adaptive(Objective::Storage))?)
+    }
+
     /// The λ with t(δ) = 0.8, where δ is the distance of the focus from W's near plane.
     fn tsm(&self, focus: f64) -> f64 {
         let delta = self.behind_near_plane(0.0, focus);
@@ -83,7 +100,7 @@ impl Tilted {
     /// corner, (1 + a u)/(1 + μ u) = ρ = (n/f)^e with e = 1/2 for storage and 2/3 for area. So the least cost
     /// is there or at the minimum of g, whichever comes first.
     ///
-    /// For f/n > 9 and θ ≥ φ it is there, and storage has
+    /// For storage, f/n > 9 and θ ≥ φ it is there:
     /// λ* = (μ − 2√(n f) tan φ cos θ)/(√(f/n) − 1) = (n + √(n f)) sin θ + (√(n f) − n) tan φ cos θ. Overhead every λ from n to
     /// λ_L needs the same storage, and λ* = λ_L.
     fn adaptive(&self, objective: Objective) -> f64 {
@@ -135,21 +152,28 @@ impl Tilted {
     /// proportional to z sin θ − y cos θ + c in V, with c = (A_z/A_y) tan φ cos θ n f/(f − n).
     fn psm(&self) -> f64 {
         let View { near: n, far: f, .. } = self.view;
-        let per_depth = f / (f - n);
-        let corner = |y: f64, z: f64| {
-            let [y, z] = [y * self.cos - self.sin / self.tan_phi, (z - per_depth) * self.cos];
+        // The light lies at this depth of the box, f/(f − n), and beyond its far side by n/(f − n).
+        let [to_near, to_far] = [f, n].map(|d| d / (f - n));
+        let corner = |y: f64, before: f64| {
+            let [y, z] = [y * self.cos - self.sin / self.tan_phi, -before * self.cos];
             let length = (self.cos * self.cos + y * y + z * z).sqrt();
             [y / length, z / length]
         };
-        let corners = [corner(-1.0, 0.0), corner(1.0, 0.0), corner(-1.0, 1.0), corner(1.0, 1.0)];
+        let corners = [
+            corner(-1.0, to_near),
+            corner(1.0, to_near),
+            corner(-1.0, to_far),
+            corner(1.0, to_far),
+        ];
         let pairs = corners.iter().flat_map(|a| corners.iter().map(move |b| nearest(*a, *b)));
         let squared = |[y, z]: &[f64; 2]| y * y + z * z;
         let [y, z] = pairs.min_by(|a, b| squared(a).total_cmp(&squared(b))).unwrap_or(corners[0]);
-        // Light along the view lies on the axis of symmetry, and so does A. No warp.
-        if y >= 0.0 {
+        // Light along the view lies on the axis of symmetry, and so does A: no warp. Neither where the cone, of
+        // which √(y² + z²) is the cosine, opens to a half-space: no perspective shows all of V.
+        if y >= 0.0 || squared(&[y, z]) <= 1e-18 {
             return f64::INFINITY;
         }
-        self.first * self.upper_slope() + z / y * self.tan_phi * self.cos * n * per_depth
+        self.first * self.upper_slope() + z / y * self.tan_phi * self.cos * n * to_near
     }
 }
 
@@ -159,5 +183,6 @@ fn nearest(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let squared = dy * dy + dz * dz;
     let share = if squared > 0.0 { -(a[0] * dy + a[1] * dz) / squared } else { 0.0 };
     let share = share.clamp(0.0, 1.0);
-    [a[0] + share * dy, a[1] + share * dz]
+    // Exact at both ends, where the digits of the smaller may be all there is.
+    [0, 1].map(|i| (1.0 - share) * a[i] + share * b[i])
 }

@@ -61,31 +61,27 @@ impl FourierStep {
         self.terms().map(|(c, amount)| amount * c * (c * x).cos()).sum()
     }
 
-    /// The offset o_M: the least x ≥ 0 at which the series reaches 1. With so much attenuation that it never does,
-    /// the x at which it comes nearest to 1.
+    /// The offset o_M: the least x ≥ 0 at which the series reaches 1. With so much attenuation that it never
+    /// does, the least x at which it is within half a grey of 255 of its highest: the highest itself may
+    /// lie far from the contact of occluder and receiver, for no gain that shows.
     pub fn offset(&self) -> f64 {
-        // The series is symmetric about x = 1/2. The shortest of its waves is sampled 32 times, so that no
-        // peak lies hidden between two samples.
+        let highest = self.tops().map(|top| self.series(top[1])).fold(0.0, f64::max);
+        let target = if highest >= 1.0 { 1.0 } else { highest - 1.0 / 510.0 };
+        let reached = self.tops().find(|top| self.series(top[1]) >= target);
+        reached.map_or(0.5, |[begin, top]| bisect(begin, top, |x| self.series(x) >= target))
+    }
+
+    /// Intervals from 0 to 1/2, about which the series is symmetric, and where in each it is highest, unless it
+    /// falls throughout.
+    fn tops(&self) -> impl Iterator<Item = [f64; 2]> {
+        // Its shortest wave is sampled 32 times, so that no interval has more than one peak.
         let samples = 16 * self.order;
-        let place = |i: u32| 0.5 * f64::from(i) / f64::from(samples);
-        let mut peak = (0.0, self.series(0.0));
-        for i in 1..=samples {
+        let place = move |i: u32| 0.5 * f64::from(i) / f64::from(samples);
+        (1..=samples).map(move |i| {
             let (begin, end) = (place(i - 1), place(i));
-            let value = self.series(end);
-            let top = if self.slope(begin) > 0.0 && self.slope(end) < 0.0 {
-                let top = bisect(begin, end, |x| self.slope(x) < 0.0);
-                (top, self.series(top))
-            } else {
-                (end, value)
-            };
-            if top.1 >= 1.0 {
-                return bisect(begin, top.0, |x| self.series(x) >= 1.0);
-            }
-            if top.1 > peak.1 {
-                peak = top;
-            }
-        }
-        peak.0
+            let has_peak = self.slope(begin) > 0.0 && self.slope(end) < 0.0;
+            [begin, if has_peak { bisect(begin, end, |x| self.slope(x) < 0.0) } else { end }]
+        })
     }
 
     /// How much light reaches a receiver at depth d past an occluder at depth z, both in 0 ..= 1: the series where
