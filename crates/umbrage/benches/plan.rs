@@ -52,6 +52,21 @@ fn plan(c: &mut Criterion) {
             });
         });
     }
+    // Receivers as 256 boxes that stand on the ground, of which the view shows most.
+    let cell = scene.size() / DVec3::new(16.0, 1.0, 16.0);
+    let part = |i: usize| {
+        let corner = scene.min + cell * DVec3::new((i % 16) as f64, 0.0, (i / 16) as f64);
+        Aabb::new(corner, corner + cell * DVec3::new(0.8, 0.1 + (i % 7) as f64 / 8.0, 0.8))
+    };
+    let parts: Vec<Aabb> = (0..256).map(part).collect();
+    let bounds = Bounds { receiver_parts: &parts, ..bounds };
+    let mut planner = Planner::new();
+    group.bench_function("adaptive, 256 boxes of receivers", |b| {
+        b.iter(|| {
+            let options = Options::default();
+            planner.plan(black_box(&camera), &[light], &bounds, &options).unwrap().maps.len()
+        });
+    });
     group.finish();
 }
 

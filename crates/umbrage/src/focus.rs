@@ -27,7 +27,7 @@ struct Face {
 #[derive(Clone, Debug, Default)]
 struct Scratch {
     distances: Vec<f64>,
-    /// Where kept vertices went; `u32::MAX` for those cut off.
+    /// Where kept vertices went; `u32::MAX` for those that no kept face has.
     moved: Vec<u32>,
     /// Edges cut by the plane (lower, higher old index) and the new vertex on each.
     cuts: Vec<(u32, u32, u32)>,
@@ -196,23 +196,25 @@ impl Body {
         cuts.clear();
         rim.clear();
         on_plane.clear();
-        for (&v, &d) in self.vertices.iter().zip(distances.iter()) {
-            if d < 0.0 {
-                moved.push(u32::MAX);
-                continue;
-            }
-            let index = vertices.len() as u32;
-            moved.push(index);
-            vertices.push(v);
-            on_plane.push(d == 0.0);
-        }
+        moved.resize(self.vertices.len(), u32::MAX);
         for face in &self.faces {
             let corners = &self.loops[face.start..face.start + face.len];
+            if corners.iter().all(|&i| distances[i as usize] <= 0.0) {
+                // Cut off. Or all of it on the plane: then a new face takes its place, if there is
+                // anything of its polyhedron inside.
+                continue;
+            }
             let start = loops.len();
             for (i, &a) in corners.iter().enumerate() {
                 let b = corners[(i + 1) % corners.len()];
-                if moved[a as usize] != u32::MAX {
-                    loops.push(moved[a as usize]);
+                let (to, d) = (&mut moved[a as usize], distances[a as usize]);
+                if d >= 0.0 {
+                    if *to == u32::MAX {
+                        *to = vertices.len() as u32;
+                        vertices.push(self.vertices[a as usize]);
+                        on_plane.push(d == 0.0);
+                    }
+                    loops.push(*to);
                 }
                 let (lo, hi) = (a.min(b), a.max(b));
                 let (d_lo, d_hi) = (distances[lo as usize], distances[hi as usize]);
@@ -230,10 +232,6 @@ impl Body {
                 }
             }
             let len = loops.len() - start;
-            if len < 3 {
-                loops.truncate(start);
-                continue;
-            }
             faces.push(Face { plane: face.plane, start, len });
             for i in start..start + len {
                 let (a, b) = (loops[i], loops[start + (i + 1 - start) % len]);
@@ -348,6 +346,102 @@ mod tests {
                 prop_assert_eq!(v + f, e + 2);
                 prop_assert_eq!(body.triangles().count(), 2 * v - 4);
             }
+        }
+    }
+
+    /// A box: anywhere, or on a lattice, where boxes touch one another and the planes that cut them; some
+    /// without thickness.
+    fn some_box() -> impl Strategy<Value = Aabb> {
+        let anywhere = prop::array::uniform2(prop::array::uniform3(-9.0..9.0f64));
+        let lattice = prop::array::uniform2(prop::array::uniform3(-3i32..=3))
+            .prop_map(|corners| corners.map(|corner| corner.map(f64::from)));
+        prop_oneof![anywhere, lattice].prop_map(|[a, b]| Aabb::new(a.into(), b.into()))
+    }
+
+    /// A plane of any direction, or one of the lattice.
+    fn cut() -> impl Strategy<Value = Plane> {
+        let lattice = (0usize..6, -3i32..=3).prop_map(|(side, offset)| {
+            let normal = DVec3::AXES[side / 2] * [1.0, -1.0][side % 2];
+            Plane { normal, offset: offset.into() }
+        });
+        prop_oneof![plane(), lattice]
+    }
+
+    /// How many separate closed surfaces the faces make up. Every edge must run along two of them, once
+    /// each way, and every vertex belong to three or more.
+    fn closed_surfaces(body: &Body) -> Result<usize, TestCaseError> {
+        let mut ways = std::collections::HashMap::new();
+        let mut root: Vec<usize> = (0..body.vertices().len()).collect();
+        let find = |root: &[usize], mut i: usize| {
+            while root[i] != i {
+                i = root[i];
+            }
+            i
+        };
+        let mut faces_at = vec![0; body.vertices().len()];
+        for face in &body.faces {
+            let corners = body.corners(face);
+            for (i, &a) in corners.iter().enumerate() {
+                let b = corners[(i + 1) % corners.len()];
+                *ways.entry((a, b)).or_insert(0) += 1;
+                faces_at[a as usize] += 1;
+                let [a, b] = [a, b].map(|v| find(&root, v as usize));
+                root[a] = b;
+            }
+        }
+        for (&(a, b), &count) in &ways {
+            prop_assert_eq!((count, ways.get(&(b, a))), (1, Some(&1)), "edge {} {}", a, b);
+        }
+        prop_assert!(faces_at.iter().all(|&n| n >= 3), "{faces_at:?}");
+        Ok((0..root.len()).filter(|&i| root[i] == i).count())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 5000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Boxes cut together are those cut one by one.
+        #[test]
+        fn many_boxes_are_cut_as_each_alone(
+            boxes in proptest::collection::vec(some_box(), 1..8),
+            cuts in proptest::collection::vec(cut(), 0..6),
+        ) {
+            let mut view = Body::default();
+            view.set_frustum(&camera());
+            let mut together = Body::default();
+            let mut alone = Vec::new();
+            let mut part = Body::default();
+            for &aabb in &boxes {
+                // Without padding, boxes of the lattice touch its planes.
+                let is_flat = aabb.size().min_element() == 0.0;
+                part.set_box(if is_flat { view.sides(aabb) } else { Body::default().sides(aabb) });
+                prop_assert_eq!(closed_surfaces(&part)?, 1);
+                together.append(&part);
+                cuts.iter().for_each(|&cut| part.clip(cut));
+                if !part.is_empty() {
+                    alone.push(part.clone());
+                }
+            }
+            for &cut in &cuts {
+                together.clip(cut);
+                closed_surfaces(&together)?;
+            }
+            let nearest = |p: DVec3, among: &[DVec3]| {
+                among.iter().map(|v| v.distance(p)).fold(f64::INFINITY, f64::min)
+            };
+            let expected: Vec<DVec3> = alone.iter().flat_map(|b| b.vertices()).copied().collect();
+            for &v in &expected {
+                prop_assert!(nearest(v, together.vertices()) < 1e-9, "{v} is missing");
+            }
+            for &v in together.vertices() {
+                prop_assert!(nearest(v, &expected) < 1e-9, "{v} is too much");
+            }
+            // Euler's formula once for each.
+            let (v, e, f) = (expected.len(), together.edges().count(), together.planes().count());
+            prop_assert_eq!(together.vertices().len(), v);
+            prop_assert_eq!(closed_surfaces(&together)?, alone.len());
+            prop_assert_eq!(v + f, e + 2 * alone.len());
+            prop_assert_eq!(f, alone.iter().map(|b| b.planes().count()).sum::<usize>());
+            prop_assert_eq!(together.triangles().count(), 2 * v - 4 * alone.len());
         }
     }
 

@@ -116,9 +116,12 @@ impl Planner {
         if !bounds.receiver_parts.is_empty() {
             whole.copy_from(view);
             view.clear();
+            let seen = Aabb::around(whole.vertices().iter().copied());
             for &aabb in bounds.receiver_parts {
-                let sides = whole.sides(local(aabb));
-                let may_be_seen = |p: &Plane| p.may_touch(local(aabb));
+                // What is cut out of a vast box would have lost the digits that the box takes.
+                let aabb = local(aabb).intersection(seen);
+                let sides = whole.sides(aabb);
+                let may_be_seen = |p: &Plane| p.may_touch(aabb);
                 if !aabb.is_empty() && self.around.iter().all(may_be_seen) {
                     part.set_box(sides);
                     self.around.iter().for_each(|&p| part.clip(p));

@@ -1,0 +1,208 @@
+//! Receivers as many boxes: all in them is served, and what none of them holds costs nothing.
+
+mod common;
+
+use common::{Config, WARPS, config, options, partition, possible};
+use glam::DVec3;
+use proptest::prelude::*;
+use umbrage::{Aabb, Bounds, Faces, Light, Options, Partition, Plan, Planner, Splits, Warp};
+
+/// Some boxes among a configuration's receivers, or in its view where there are none: some flat, some
+/// empty, some twice, some out of sight. They are given by numbers, for any configuration.
+fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
+    let unit = || prop::array::uniform3(0.0..=1.0f64);
+    let within = (unit(), unit(), 0.0..=1.0f64, 0usize..6)
+        .prop_map(|(a, b, size, flat)| PartialBox::Within { a, b, size, flat });
+    let some = prop_oneof![
+        8 => within,
+        1 => Just(PartialBox::Empty),
+        1 => Just(PartialBox::SameAsLast),
+        1 => Just(PartialBox::OutOfSight),
+    ];
+    prop::collection::vec(some, 1..12)
+}
+
+#[derive(Clone, Debug)]
+enum PartialBox {
+    /// From a towards b, `size` of the way; without thickness along an axis if `flat` names one.
+    Within {
+        a: [f64; 3],
+        b: [f64; 3],
+        size: f64,
+        flat: usize,
+    },
+    Empty,
+    SameAsLast,
+    OutOfSight,
+}
+
+fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
+    let Config { camera, bounds, .. } = config;
+    let place = |n: [f64; 3]| match bounds.receivers {
+        Some(all) => all.min + all.size() * DVec3::from(n),
+        None => common::point_in_view(camera, n),
+    };
+    let mut parts: Vec<Aabb> = Vec::new();
+    for partial in boxes {
+        parts.push(match *partial {
+            PartialBox::Within { a, b, size, flat } => {
+                let a = place(a);
+                let mut b = a.lerp(place(b), size);
+                if flat < 3 {
+                    b[flat] = a[flat];
+                }
+                Aabb::new(a, b)
+            }
+            PartialBox::Empty => Aabb::EMPTY,
+            PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
+            PartialBox::OutOfSight => {
+                let behind = camera.eye() - camera.forward() * 3.0 * camera.far();
+                Aabb::new(behind, behind + camera.far() * 0.1)
+            }
+        });
+    }
+    parts
+}
+
+/// Points of the parts that the camera sees in the light.
+fn seen_points(config: &Config, parts: &[Aabb], numbers: &[[f64; 3]]) -> Vec<DVec3> {
+    let full = parts.iter().filter(|p| !p.is_empty());
+    let points = full.flat_map(|p| numbers.iter().map(|&n| p.min + p.size() * DVec3::from(n)));
+    points.filter(|&p| config.sees(p)).collect()
+}
+
+fn plan(config: &Config, bounds: &Bounds<'_>, options: &Options) -> Plan {
+    Planner::new().plan(&config.camera, &[config.light], bounds, options).unwrap().clone()
+}
+
+fn under_a_sun() -> impl Strategy<Value = Config> {
+    config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. }))
+}
+
+fn cases(cases: u32) -> ProptestConfig {
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+}
+
+proptest! {
+    #![proptest_config(cases(5000))]
+
+    /// Every point of a part that is seen is served, by maps whose errors there are no larger than they
+    /// say, and into which its casters are drawn.
+    #[test]
+    fn all_parts_are_served(
+        config in config(),
+        boxes in boxes(),
+        partition in partition(),
+        numbers in prop::collection::vec(prop::array::uniform3(0.0..=1.0f64), 4),
+        pick in 0..WARPS.len(),
+    ) {
+        let (name, warp) = WARPS[pick];
+        let partition = possible(partition, warp);
+        let parts = parts(&config, &boxes);
+        let bounds = Bounds { receiver_parts: &parts, ..config.bounds };
+        let plan = plan(&config, &bounds, &Options { partition, ..options(warp) });
+        for map in &plan.maps {
+            let errors = [map.error.max_s, map.error.max_t, map.error.max];
+            prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite());
+            prop_assert!(errors.iter().all(|e| e.is_finite()) && map.storage_factor.is_finite());
+        }
+        // World coordinates carry rounding of their own, worth this much of the scene.
+        let rounding = config.camera.eye().abs().max_element() * 1e-15;
+        for p in seen_points(&config, &parts, &numbers) {
+            let answers: Vec<(usize, f64)> = plan.lookup(0, p).collect();
+            let shares: f64 = answers.iter().map(|(_, share)| share).sum();
+            prop_assert!((shares - 1.0).abs() < 1e-9, "{name}: shares of {shares} at {p}");
+            for (index, _) in answers {
+                let map = &plan.maps[index];
+                let Some(shadow) = map.project(p) else {
+                    return Err(TestCaseError::fail(format!("{name}: {p} is behind the map")));
+                };
+                let error = map.perspective_error(&config.camera, p).unwrap();
+                let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+                // Rounding in shadow coordinates, from its size in metres and the texel's.
+                let [slack_s, slack_t] = [(error.s, 0), (error.t, 1)].map(|(texel, axis)| {
+                    1e-7 + rounding / (texel * pixel * f64::from(map.resolution[axis]))
+                });
+                prop_assert!((-slack_s..=1.0 + slack_s).contains(&shadow.x), "{name}: {shadow}");
+                prop_assert!((-slack_t..=1.0 + slack_t).contains(&shadow.y), "{name}: {shadow}");
+                prop_assert!((-1e-6..=1.0 + 1e-6).contains(&shadow.z), "{name}: {shadow}");
+                let largest = [map.error.max_s, map.error.max_t, map.error.max];
+                for (found, largest) in [error.s, error.t, error.worst].into_iter().zip(largest) {
+                    prop_assert!(found <= largest * (1.0 + 1e-6), "{name}: {error:?} {:?}", map.error);
+                }
+                let reach = match config.light {
+                    Light::Directional { .. } => 10.0 * config.camera.far(),
+                    Light::Spot(spot) => 0.9 * p.distance(spot.position),
+                    Light::Point(point) => 0.9 * p.distance(point.position),
+                };
+                let caster = p + config.light.direction_to_light(p) * reach;
+                prop_assert!(map.may_cast(Aabb::new(p, p)) && map.may_cast(Aabb::new(caster, caster)));
+            }
+        }
+    }
+
+    /// An even map of the parts costs no more texels than one of a box around them all, for the same
+    /// error: it is no larger, and nothing in it nearer to the viewer.
+    #[test]
+    fn parts_cost_no_more_than_a_box_around_them(
+        config in under_a_sun(),
+        boxes in boxes(),
+    ) {
+        let parts = parts(&config, &boxes);
+        let all = parts.iter().filter(|p| !p.is_empty()).fold(Aabb::EMPTY, |all, p| all.union(*p));
+        let all = config.bounds.receivers.map_or(all, |r| r.intersection(all));
+        prop_assume!(!all.is_empty());
+        let storage = |bounds: Bounds<'_>| plan(&config, &bounds, &options(Warp::Uniform)).storage_factor();
+        let one = storage(Bounds { receivers: Some(all), ..config.bounds });
+        let many = storage(Bounds { receiver_parts: &parts, ..config.bounds });
+        prop_assert!(many <= one * 1.01, "{many} > {one}");
+    }
+
+    /// A part that holds all that is seen changes nothing. (Under lamps the largest errors are upper
+    /// bounds, whose slack depends on where their search begins.)
+    #[test]
+    fn a_part_around_everything_changes_nothing(
+        config in under_a_sun(),
+        partition in partition(),
+        pick in 0..WARPS.len(),
+        larger in prop_oneof![Just(0.0), Just(10.0), Just(1e9)],
+    ) {
+        let (name, warp) = WARPS[pick];
+        // Rounding decides where a search for fitted slices ends, and the range on a face where light and
+        // view nearly agree.
+        prop_assume!(partition.splits != Splits::Fitted);
+        let partition = Partition { faces: Faces::Whole, ..possible(partition, warp) };
+        let options = Options { partition, ..options(warp) };
+        let far = config.camera.far();
+        let around_view = Aabb::new(config.camera.eye() - 9.0 * far, config.camera.eye() + 9.0 * far);
+        let all = config.bounds.receivers.unwrap_or(around_view);
+        // Boxes without thickness get one that depends on what else there is.
+        let is_flat = all.size().min_element() == 0.0;
+        let larger = if is_flat { f64::max(larger, 1.0) } else { larger };
+        let part = [Aabb { min: all.min - larger, max: all.max + larger }];
+        let expected = plan(&config, &config.bounds, &options);
+        let found = plan(&config, &Bounds { receiver_parts: &part, ..config.bounds }, &options);
+        let tolerance = match warp {
+            // Its strength is somewhere on a valley's flat bottom.
+            Warp::Adaptive(_) => 1e-5,
+            // Multiplies roundings where near and far hardly differ.
+            Warp::Psm => 1e-3,
+            // Of hardly any thickness is made what rounding leaves of it.
+            _ if all.size().min_element() < 1e-3 * all.size().max_element() => 1e-6,
+            _ => 1e-9,
+        };
+        let near = |a: f64, b: f64| (a - b).abs() <= tolerance * a.abs().max(b.abs());
+        for (a, b) in expected.maps.iter().zip(&found.maps) {
+            prop_assert_eq!(a.part, b.part);
+            prop_assert_eq!(a.is_empty(), b.is_empty());
+            let figures = |m: &umbrage::ShadowMap| {
+                let texels = m.resolution.map(f64::from);
+                let unit = [m.error.max_s * texels[0], m.error.max_t * texels[1]];
+                [m.split[0], m.split[1], unit[0], unit[1]]
+            };
+            for (x, y) in figures(a).into_iter().zip(figures(b)) {
+                prop_assert!(near(x, y), "{name}: {:?} {:?}", figures(a), figures(b));
+            }
+        }
+    }
+}
