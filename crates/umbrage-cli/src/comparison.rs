@@ -43,6 +43,7 @@ pub(crate) struct Compared<'a> {
     comparison: &'a Comparison<'a>,
     truth: TruthSoFar,
     contenders: Vec<Contender<'a>>,
+    motion: Option<umbrage_measure::Motion>,
 }
 
 /// A technique at work: its maps, and the picture so far.
@@ -142,7 +143,7 @@ impl<'a> Comparison<'a> {
             });
         }
         let truth = trace(&self.view, &mut contenders, progress);
-        Ok(Compared { comparison: self, truth, contenders })
+        Ok(Compared { comparison: self, truth, contenders, motion: None })
     }
 }
 
@@ -171,6 +172,7 @@ impl Compared<'_> {
         for (contender, flicker) in self.contenders.iter_mut().zip(flicker) {
             contender.flicker = flicker;
         }
+        self.motion = Some(umbrage_measure::Motion { kind: motion.name().to_owned(), frames });
         Ok(())
     }
 
@@ -199,6 +201,7 @@ impl Compared<'_> {
             view: view_info(onlooker),
             light: light_info(lamp),
             truth: Truth { rays_per_pixel: options.samples.pow(2), seconds },
+            motion: self.motion,
             results,
         };
         write_report(

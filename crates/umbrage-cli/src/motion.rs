@@ -32,6 +32,15 @@ pub(crate) struct Scenery<'a> {
 }
 
 impl Motion {
+    /// Its name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Dolly => "dolly",
+            Self::Orbit => "orbit",
+            Self::Sun => "sun",
+        }
+    }
+
     /// View and light of a frame; the first is as told.
     fn frame(self, look: LookAt, light: Light, index: u32) -> Result<(Camera, Light)> {
         let index = f64::from(index);

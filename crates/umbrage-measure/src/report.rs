@@ -17,6 +17,9 @@ pub struct Report {
     pub light: LightInfo,
     /// How the truth was made.
     pub truth: Truth,
+    /// What [`Measured::flicker`] was measured in; `None` if nothing moved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
     /// One a shadow specification, in the order they were asked for.
     pub results: Vec<Measured>,
 }
@@ -86,6 +89,15 @@ pub struct Truth {
     pub rays_per_pixel: u32,
     /// Wall-clock time to trace it all, seconds.
     pub seconds: Option<f64>,
+}
+
+/// Frames that follow one another.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Motion {
+    /// What moves and how, in a word: `dolly`, `orbit`, `sun`.
+    pub kind: String,
+    /// How many frames there are, the first of them the report's own view.
+    pub frames: u32,
 }
 
 /// One technique's figures.
@@ -201,6 +213,7 @@ pub(crate) mod tests {
             },
             light: LightInfo::Directional { name: None, direction: [0.0, -1.0, 0.0] },
             truth: Truth { rays_per_pixel: 16, seconds: Some(1.25) },
+            motion: None,
             results: wrong.iter().enumerate().map(result).collect(),
         }
     }
@@ -227,6 +240,22 @@ pub(crate) mod tests {
             "ms": {"plan": 0.004, "depth": 812.5, "filter": null, "shade": 95.25},
         });
         assert_eq!(json["results"], json!([expected]));
+    }
+
+    /// Reports of views that stand still, and those from before there were motions, say nothing of one.
+    #[test]
+    fn motion_is_told_where_there_was_one() {
+        let mut report = report(&[Some(0.25)]);
+        let still = report.to_json().unwrap();
+        assert!(!still.contains("motion") && !still.contains("flicker"), "{still}");
+        assert_eq!(Report::from_json(&still).unwrap(), report);
+        report.motion = Some(Motion { kind: "orbit".to_owned(), frames: 6 });
+        report.results[0].flicker = Some(0.086);
+        let text = report.to_json().unwrap();
+        let json: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["motion"], json!({"kind": "orbit", "frames": 6}));
+        assert_eq!(json["results"][0]["flicker"], 0.086);
+        assert_eq!(Report::from_json(&text).unwrap(), report);
     }
 
     #[test]

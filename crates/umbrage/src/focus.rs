@@ -428,7 +428,7 @@ mod tests {
             let nearest = |p: DVec3, among: &[DVec3]| {
                 among.iter().map(|v| v.distance(p)).fold(f64::INFINITY, f64::min)
             };
-            let expected: Vec<DVec3> = alone.iter().flat_map(|b| b.vertices()).copied().collect();
+            let expected: Vec<DVec3> = alone.iter().flat_map(Body::vertices).copied().collect();
             for &v in &expected {
                 prop_assert!(nearest(v, together.vertices()) < 1e-9, "{v} is missing");
             }

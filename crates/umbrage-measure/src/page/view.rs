@@ -35,6 +35,7 @@ pub(super) struct Html<'a> {
     scale_max: String,
     counted: String,
     undefined: bool,
+    flicker: bool,
     setup: Vec<(&'static str, String)>,
     techniques: Vec<(String, &'static str)>,
     notices: &'a [String],
@@ -139,6 +140,7 @@ impl<'a> Html<'a> {
             scale_max: significant(f64::from(scale.max())),
             counted: counted(report),
             undefined: report.results.iter().any(|r| r.error_px.undefined > 0),
+            flicker: report.results.iter().any(|r| r.flicker.is_some()),
             setup: setup(report),
             techniques: techniques(report.results.iter().map(|r| r.shadows.as_str())),
             notices,
@@ -288,6 +290,10 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
         ]),
     }
     setup.push(("Truth", truth_how(report)));
+    if let Some(motion) = &report.motion {
+        let frames = plural(motion.frames.into(), "frame");
+        setup.push(("Motion", format!("{}, {frames}", motion.kind)));
+    }
     setup
 }
 
@@ -399,6 +405,31 @@ mod tests {
             "Light: “flame”, spot at (0, 2.35, −1) m; shines: (0, −1, 0), 30° to each side; \
              reaches: 12.5 m"
         );
+    }
+
+    #[test]
+    fn motion_is_shown_where_there_was_one() {
+        let mut report = report(&[Some(0.5), Some(0.25)]);
+        let pictures = [Pictures::default(), Pictures::default()];
+        let shows = |report: &Report| {
+            let page = Page {
+                report,
+                truth: &Pictures::default(),
+                pictures: &pictures,
+                scale: crate::ErrorScale::default(),
+                notices: &[],
+                command: None,
+            };
+            let html = Html::new(&page).unwrap().render().unwrap();
+            ["<dt>Motion</dt><dd>orbit, 6 frames</dd>", "<dt>Flicker</dt><dd>The share of"]
+                .map(|text| html.contains(text))
+        };
+        assert_eq!(shows(&report), [false, false]);
+        report.motion = Some(crate::Motion { kind: "orbit".to_owned(), frames: 6 });
+        // Nothing that both frames show need face the light.
+        assert_eq!(shows(&report), [true, false]);
+        report.results[1].flicker = Some(0.0);
+        assert_eq!(shows(&report), [true, true]);
     }
 
     #[test]

@@ -256,6 +256,7 @@ impl Compared {
                 direction: unit(SUN_TRAVELS).map(f64::from),
             },
             truth: Truth { rays_per_pixel: 16, seconds: Some(12.34) },
+            motion: None,
             results,
         };
         let page = Page {
