@@ -1,9 +1,11 @@
 //! The command line: what may be asked for, parsed and checked, before any work begins.
 
+use crate::figures;
 use crate::motion::Motion;
 use crate::spec::Technique;
 use crate::values;
 use anyhow::{Result, bail, ensure};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
 use std::ffi::OsString;
@@ -44,6 +46,8 @@ pub(crate) enum Command {
     Plan(Plan),
     /// List the built-in scenes.
     Scenes(Scenes),
+    /// Compute the papers' figures again, from closed forms and from planned maps.
+    Figures(Figures),
 }
 
 /// `umbrage render`.
@@ -235,6 +239,21 @@ pub(crate) struct Scenes {
     pub(crate) json: bool,
 }
 
+/// `umbrage figures`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage figures -o figures
+  umbrage figures -o figures --only lispsm-fig6")]
+pub(crate) struct Figures {
+    /// Folder for pictures, tables and their page; former figures there are replaced.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Make this figure alone; once for each.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(figures::names()))]
+    pub(crate) only: Vec<String>,
+}
+
 /// Which scene.
 #[derive(Debug, Args)]
 pub(crate) struct SceneArgs {
@@ -416,7 +435,7 @@ pub(crate) fn parse(
         Command::Compare(compare) => compare.check(),
         Command::Sweep(sweep) => sweep.comparison.check(),
         Command::Plan(plan) => plan.check(),
-        Command::Scenes(_) => Ok(()),
+        Command::Scenes(_) | Command::Figures(_) => Ok(()),
     };
     checked.map_err(|e| clap::Error::raw(clap::error::ErrorKind::ValueValidation, e))?;
     Ok((command, verbose))

@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::comparison::{Comparison, Stage};
-use crate::output::{ReportFolder, aligned, command_line, note, print};
+use crate::output::{Contents, ReportFolder, aligned, command_line, note, print};
 use crate::pixels::NOTHING_TO_SHADOW;
 use crate::progress::Progress;
 use crate::setup::{open_scene, tell_notices};
@@ -11,7 +11,7 @@ use umbrage_measure::Report;
 
 /// Compares, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
-    let folder = ReportFolder::check(&args.output)?;
+    let folder = ReportFolder::check(&args.output, Contents::Comparison)?;
     let scene = open_scene(&args.scene.name)?;
     let stage = Stage::new(&scene, args.scene.opaque, args.comparison.fit)?;
     let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;

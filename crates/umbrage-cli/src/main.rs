@@ -5,6 +5,7 @@
 mod args;
 mod compare;
 mod comparison;
+mod figures;
 mod motion;
 mod output;
 mod pixels;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         Command::Sweep(args) => sweep::run(args, quiet),
         Command::Plan(args) => plan::run(args),
         Command::Scenes(args) => scenes::run(args),
+        Command::Figures(args) => figures::run(args, quiet),
     })
 }
 

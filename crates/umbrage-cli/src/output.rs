@@ -115,19 +115,61 @@ impl Drop for Staging {
     }
 }
 
+/// What a report's folder holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Contents {
+    /// A comparison of techniques.
+    Comparison,
+    /// The papers' figures.
+    Figures,
+}
+
+impl Contents {
+    /// What it is called.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Comparison => "a report",
+            Self::Figures => "figures of umbrage",
+        }
+    }
+
+    /// Whether a folder with these files is a former one.
+    fn is_former(self, names: &[String]) -> bool {
+        let has = |file: &str| names.iter().any(|n| n == file);
+        match self {
+            Self::Comparison => has("index.html") && has("report.json") || has(VIEW_RECORD),
+            Self::Figures => has("index.html") && has("figures.json"),
+        }
+    }
+
+    /// Whether a former one may have had this file.
+    fn has_file(self, name: &str) -> bool {
+        match self {
+            Self::Comparison => {
+                ["index.html", "report.json", VIEW_RECORD].contains(&name) || name.ends_with(".png")
+            }
+            Self::Figures => {
+                ["index.html", "figures.json"].contains(&name)
+                    || crate::figures::may_have_made(name)
+            }
+        }
+    }
+}
+
 /// The folder of a report: where it will stand, and what stands there now.
 pub(crate) struct ReportFolder {
     target: PathBuf,
     parent: PathBuf,
+    contents: Contents,
 }
 
 impl ReportFolder {
     /// Checks, before any work, that a report can be written to `target`: a new folder, an empty one,
     /// or a former report, which will be replaced.
-    pub(crate) fn check(target: &Path) -> Result<Self> {
+    pub(crate) fn check(target: &Path, contents: Contents) -> Result<Self> {
         let parent = existing_parent(target)?;
         Staging::new(&parent)?;
-        let folder = Self { target: target.to_owned(), parent };
+        let folder = Self { target: target.to_owned(), parent, contents };
         folder.check_replaceable()?;
         Ok(folder)
     }
@@ -143,19 +185,14 @@ impl ReportFolder {
             .with_context(|| format!("--output: cannot read {target}"))?;
         let names: Vec<String> =
             entries.iter().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
-        let has = |file: &str| names.iter().any(|n| n == file);
-        let is_report = has("index.html") && has("report.json") || has(VIEW_RECORD);
+        let what = self.contents.name();
         ensure!(
-            names.is_empty() || is_report,
-            "--output: {target} holds something other than a report; take another folder or empty it"
+            names.is_empty() || self.contents.is_former(&names),
+            "--output: {target} holds something other than {what}; take another folder or empty it"
         );
-        let is_ours = |name: &String| {
-            ["index.html", "report.json", VIEW_RECORD].contains(&name.as_str())
-                || name.ends_with(".png")
-        };
-        if let Some(strange) = names.iter().find(|n| !is_ours(n)) {
+        if let Some(strange) = names.iter().find(|n| !self.contents.has_file(n)) {
             bail!(
-                "--output: {target} holds {strange}, which is not part of a report; take another folder \
+                "--output: {target} holds {strange}, which is not part of {what}; take another folder \
                  or move it away"
             );
         }

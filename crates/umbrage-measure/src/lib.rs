@@ -30,7 +30,9 @@ pub use files::{ExrPixel, PngPixel, write_exr, write_file, write_png};
 pub use image::{Image, Rgb};
 pub use maps::{difference_map, error_map, grey, partition_map, texel_map};
 pub use metrics::{ErrorPx, Metrics, measure, measure_error_px, worst_spot};
-pub use page::{Page, SweepPage, write_report, write_sweep};
+pub use page::{
+    FigureFile, FigureShown, FiguresPage, Page, SweepPage, write_figures, write_report, write_sweep,
+};
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
 pub use report::{LightInfo, Measured, Motion, Report, Times, Truth, View};
 pub use sweep::{Mean, Sweep, SweepSettings, SweptView};

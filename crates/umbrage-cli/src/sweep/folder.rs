@@ -11,7 +11,7 @@
 //! under a name that begins with `.umbrage-`; the next process clears it away.
 
 use super::views::View;
-use crate::output::{ReportFolder, TEMPORARY, VIEW_RECORD, existing_parent};
+use crate::output::{Contents, ReportFolder, TEMPORARY, VIEW_RECORD, existing_parent};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -132,7 +132,7 @@ impl SweepFolder {
 
     /// Where a view's report goes, checked before any work.
     pub(super) fn place(&self, name: &str) -> Result<ReportFolder> {
-        ReportFolder::check(&view_folder(&self.path, name))
+        ReportFolder::check(&view_folder(&self.path, name), Contents::Comparison)
     }
 }
 

@@ -1,6 +1,7 @@
-//! The HTML pages: a report's, a sweep's.
+//! The HTML pages: a report's, a sweep's, the papers' figures.
 
 mod chart;
+mod figures;
 mod numbers;
 mod sweep;
 mod table;
@@ -9,6 +10,7 @@ mod view;
 
 use crate::{Error, ErrorScale, Pictures, Report, write_file};
 use askama::Template;
+pub use figures::{FigureFile, FigureShown, FiguresPage, write_figures};
 use std::path::Path;
 pub use sweep::{SweepPage, write_sweep};
 

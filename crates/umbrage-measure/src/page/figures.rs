@@ -1,0 +1,80 @@
+//! The page of the papers' figures.
+
+use crate::{Error, write_file};
+use askama::Template;
+use serde::Serialize;
+use std::path::Path;
+
+/// Figures with their files, ready to be shown.
+#[derive(Clone, Copy, Debug)]
+pub struct FiguresPage<'a> {
+    /// In the page's order.
+    pub figures: &'a [FigureShown],
+    /// The command line that makes this page again.
+    pub command: &'a str,
+}
+
+/// One figure.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FigureShown {
+    /// Its anchor on the page: small letters, digits and hyphens.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// Which figure of which paper.
+    pub source: String,
+    /// What to see in it, a paragraph.
+    pub text: String,
+    /// Pictures and tables.
+    pub files: Vec<FigureFile>,
+}
+
+/// A picture or a table of a figure.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FigureFile {
+    /// Its name in the page's folder; `.csv` is a table, all else a picture.
+    pub file: String,
+    /// What it shows, for those who cannot see it, or what a table's rows are.
+    pub about: String,
+}
+
+impl FigureFile {
+    fn is_table(&self) -> bool {
+        self.file.ends_with(".csv")
+    }
+}
+
+#[derive(Template)]
+#[template(path = "figures.html")]
+struct Html<'a> {
+    css: &'static str,
+    version: &'static str,
+    figures: &'a [FigureShown],
+    command: &'a str,
+}
+
+/// Writes `figures.json`, the list of figures, and then `index.html` into `folder`, which must exist and hold
+/// the figures' files. The page opens offline.
+///
+/// # Errors
+/// If a file is missing in `folder`, or the two cannot be written.
+pub fn write_figures(folder: impl AsRef<Path>, page: &FiguresPage<'_>) -> Result<(), Error> {
+    let folder = folder.as_ref();
+    let mut files = page.figures.iter().flat_map(|f| &f.files);
+    if let Some(missing) = files.find(|f| !folder.join(&f.file).is_file()) {
+        let problem = format!("{} is not in {}", missing.file, folder.display());
+        return Err(Error::Report { field: "figures", problem });
+    }
+    let path = folder.join("index.html");
+    let html = Html {
+        css: include_str!("../../assets/report.css"),
+        version: env!("CARGO_PKG_VERSION"),
+        figures: page.figures,
+        command: page.command,
+    };
+    let html =
+        html.render().map_err(|e| Error::Encode { path: path.clone(), reason: e.to_string() })?;
+    let json = serde_json::to_string_pretty(page.figures)? + "\n";
+    write_file(folder.join("figures.json"), json.as_bytes())?;
+    write_file(path, html.as_bytes())
+}
