@@ -1,6 +1,7 @@
 //! From a homography of the light plane to a map's matrices.
 
 use crate::math::range;
+use crate::plan::ShadowMap;
 use crate::warp::{LightSpace, Seen};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
@@ -71,6 +72,24 @@ pub(crate) fn matrices(homography: DMat3, depth: DepthRange, space: &LightSpace)
     let y = w * middle - DVec4::new(0.0, 0.0, span, nearest);
     let light_from_shadow = DMat4::from_cols(x, y, z, w).transpose();
     [shadow_from_light * space.light_from_local(), space.local_from_light() * light_from_shadow]
+}
+
+/// How many texels' widths, laid along the beam, lie between depth 0 and the receivers nearest the light:
+/// what filters reach to one side of a receiver, twice. Casters before the receivers are clamped to depth
+/// 0, where a shadow test must still tell them from the receivers less all that it allows for.
+pub(crate) const MARGIN_TEXELS: f64 = 16.0;
+
+impl ShadowMap {
+    /// Moves depth 0 towards the light by a share of the range of depths.
+    pub(crate) fn begin_earlier(&mut self, share: f64) {
+        let m = &mut self.shadow_from_local;
+        let depth = (m.row(2) + m.row(3) * share) / (1.0 + share);
+        let rows = [m.row(0), m.row(1), depth, m.row(3)];
+        *m = DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
+        let inverse = &mut self.local_from_shadow;
+        inverse.w_axis -= inverse.z_axis * share;
+        inverse.z_axis *= 1.0 + share;
+    }
 }
 
 /// Distance from the line on which a homography's w vanishes to what is seen: λ. `None` if w

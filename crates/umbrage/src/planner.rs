@@ -3,7 +3,7 @@ use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::casters::caster_planes;
 use crate::error::Error;
-use crate::fit::{DepthRange, fit, lambda, matrices};
+use crate::fit::{DepthRange, MARGIN_TEXELS, fit, lambda, matrices};
 use crate::focus::Body;
 use crate::light::{Lamp, Light};
 use crate::math::range;
@@ -377,6 +377,9 @@ impl Scratch {
                 set(map, larger);
             }
         }
+        if draft.still.is_none() {
+            map.begin_earlier(MARGIN_TEXELS * texel_depth(map, &draft.body));
+        }
         let height = f64::from(camera.image()[1]);
         map.storage_factor =
             map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
@@ -415,6 +418,15 @@ impl ShadowMap {
         caster_planes.clear();
         *self = Self { origin: camera.eye(), cell, caster_planes, ..Self::default() };
     }
+}
+
+/// The largest width of a texel, laid along the beam, in depth.
+fn texel_depth(map: &ShadowMap, body: &Body) -> f64 {
+    let at = |&v: &DVec3| {
+        let local = Local::at(map, v)?;
+        Some(local.footprint().longest() * local.depth_per_metre)
+    };
+    body.vertices().iter().filter_map(at).fold(0.0, f64::max)
 }
 
 /// Largest m_s and m_t of a map at the body's vertices.

@@ -1,7 +1,7 @@
 //! Maps that stand still in the world.
 
 use crate::camera::Camera;
-use crate::fit::{DepthRange, matrices};
+use crate::fit::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::light::Lamp;
 use crate::plan::ShadowMap;
 use crate::warp::LightSpace;
@@ -63,7 +63,8 @@ impl Still {
                 };
                 let middle = [snapped(self.space.x, texel[0]), snapped(self.space.z, texel[1])];
                 // Depth moves in steps as well, so that what is stored does not change in between.
-                let depth = DepthRange::around(snapped(self.space.y, texel[0]), radius + texel[0]);
+                let margin = (1.0 + MARGIN_TEXELS) * texel[0].max(texel[1]);
+                let depth = DepthRange::around(snapped(self.space.y, texel[0]), radius + margin);
                 (middle, width, depth)
             }
         };
@@ -72,6 +73,12 @@ impl Still {
         let homography = DMat3::from_cols(s, t, DVec3::Z).transpose();
         [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &self.space);
         map.apex = self.space.apex;
+        if let Covers::Pyramid { slope, inverse_depths: [far, near] } = self.covers {
+            // A texel there is 2 slope/res of the way to the lamp wide, and 1/depth grows by as much.
+            let shortest = map.resolution[0].min(map.resolution[1]);
+            let texel = 2.0 * slope / f64::from(shortest) * near;
+            map.begin_earlier(MARGIN_TEXELS * texel / (near - far));
+        }
     }
 }
 

@@ -15,6 +15,9 @@
 //!   its texels, so it cannot tell such a rise from an occluder that close.
 //! - 2⁻²⁵ is half a unit in the last place of depths stored in single precision.
 //!
+//! What lies before the receivers is stored as depth 0, clamped, and hides everything: the limit is never
+//! less than 2⁻²⁵. Planned maps leave room before the receivers for all but surfaces nearly edge-on.
+//!
 //! Measured as the share of wrong pixels (`hard`, one `adaptive` map of 2048², geometric mean over twelve
 //! views of six real scenes at 960×540 against ray-traced truth): the plane alone 0.0173; the minimum
 //! 0.0127; the minimum with h 0.0085. In place of h, the standard deviation of the plane's depth over
@@ -26,6 +29,9 @@ use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
 use std::fmt;
+
+/// Half a unit in the last place of single precision below 1.
+const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
 
 /// How far outside [0, 1]² shadow coordinates still count as inside.
 const ROUNDING: f64 = 1e-6;
@@ -89,7 +95,7 @@ pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
 
 /// How much of the light reaches `receiver`, from 0 to 1, by the depths of `map`'s texels. `fetch`
 /// gives the depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
-/// Receivers outside the map are lit.
+/// Receivers outside the map, or before its depths, are lit.
 pub fn visibility(
     map: &ShadowMap,
     filter: Filter,
@@ -100,7 +106,7 @@ pub fn visibility(
     // What is served lies in the map up to rounding, at the border of its part as well.
     let is_inside =
         st.cmpge(DVec2::splat(-ROUNDING)).all() && st.cmple(DVec2::splat(1.0 + ROUNDING)).all();
-    if map.is_empty() || !is_inside {
+    if map.is_empty() || !is_inside || receiver.depth < 0.0 {
         return 1.0;
     }
     let texel = texel_coordinates(map, st);
@@ -133,8 +139,7 @@ struct Test<'a> {
 
 impl<'a> Test<'a> {
     fn new(map: &'a ShadowMap, receiver: &'a Receiver) -> Self {
-        let rounding = f64::from(f32::EPSILON) / 4.0;
-        Self { map, receiver, slack: receiver.half_texel + rounding }
+        Self { map, receiver, slack: receiver.half_texel + HALF_ULP }
     }
 
     /// The depth from which on texel (i, j) does not hide the receiver.
@@ -148,7 +153,8 @@ impl<'a> Test<'a> {
         // An edge-on receiver's infinite slope makes the rise infinite or NaN. `min` ignores NaN.
         let rise = self.receiver.slope.dot(center - self.receiver.st);
         // Depths end at 1: what is stored as 1 may lie anywhere behind.
-        depth.min(depth + rise).min(1.0) - self.slack
+        // What is stored as 0 is a caster that was clamped, however much is allowed for.
+        (depth.min(depth + rise).min(1.0) - self.slack).max(HALF_ULP)
     }
 }
 

@@ -79,7 +79,8 @@ proptest! {
         s in 0.0..=1.0, t in 0.0..=1.0, elevation in 0.001f64..1.5, azimuth in 0.0..6.3,
         ratio in 1.001f64..1e4,
     ) {
-        // Stored as a map would: the plane's depth at each texel's centre, in single precision.
+        // Stored as a map would: the plane's depth at each texel's centre, in single precision. Where a map
+        // serves a plane it leaves room before it.
         let slope = DVec2::from_angle(azimuth) / elevation.tan();
         for rows in [Rows::Even, Rows::Logarithmic { ratio }] {
             let map = map([37, 23], rows);
@@ -87,7 +88,7 @@ proptest! {
             let stored = |i: i32, j: i32| {
                 let row = (f64::from(j) + 0.5) / 23.0;
                 let center = DVec2::new((f64::from(i) + 0.5) / 37.0, rows.t_from_row(row));
-                (0.4 + slope.dot(center - receiver.st)).clamp(0.0, 1.0) as f32
+                (0.4 + slope.dot(center - receiver.st)).clamp(1e-7, 1.0) as f32
             };
             for filter in filters() {
                 prop_assert_eq!(visibility(&map, filter, &receiver, stored), 1.0);
@@ -129,6 +130,9 @@ fn outside_the_map_or_its_depths_there_is_light() {
         assert_eq!(visibility(&empty, filter, &flat(0.5, 0.5, 0.5), all_dark), 1.0);
         let map = map([8, 8], Rows::Even);
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 0.5), all_dark), 0.0);
+        // A clamped caster hides what is allowed more than its depth.
+        let coarse = Receiver { half_texel: 0.2, ..flat(0.5, 0.5, 0.1) };
+        assert_eq!(visibility(&map, filter, &coarse, all_dark), 0.0);
         // Nearer than what casts; and behind the map's far end where nothing was hit.
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, -0.1), all_dark), 1.0);
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 1.5), |_, _| 1.0), 1.0);
