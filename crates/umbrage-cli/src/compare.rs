@@ -7,7 +7,7 @@ use crate::pixels::NOTHING_TO_SHADOW;
 use crate::progress::Progress;
 use crate::setup::{open_scene, tell_notices};
 use anyhow::Result;
-use umbrage_measure::Report;
+use umbrage_measure::{Measured, Report};
 
 /// Compares, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
@@ -15,6 +15,9 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let scene = open_scene(&args.scene.name)?;
     let stage = Stage::new(&scene, args.scene.opaque, args.comparison.fit)?;
     let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;
+    if let Some(motion) = args.motion {
+        comparison.check_motion(motion, args.frames)?;
+    }
     tell_notices(&scene);
     args.comparison.execution.announce();
     let rows_in_motion = u64::from(args.frames) * u64::from(args.view.size[1]);
@@ -41,42 +44,28 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 }
 
 fn table(report: &Report) -> String {
-    let head = [
-        "shadows",
-        "maps",
-        "texels",
-        "wrong",
-        "false light",
-        "mean error",
-        "FLIP",
-        "flicker",
-        "px/texel 50%",
-        "95%",
-        "max",
-        "plan ms",
-        "depth ms",
-        "shade ms",
+    type Column = (&'static str, fn(&Measured) -> String);
+    const COLUMNS: [Column; 15] = [
+        ("shadows", |r| r.shadows.clone()),
+        ("maps", |r| r.maps.to_string()),
+        ("texels", |r| r.texels.to_string()),
+        ("wrong", |r| percent(r.metrics.wrong_fraction)),
+        ("false light", |r| percent(r.metrics.false_light)),
+        ("mean error", |r| number(r.metrics.mean_abs_error, 4)),
+        ("FLIP", |r| number(r.metrics.flip, 4)),
+        ("flicker", |r| percent(r.flicker)),
+        ("px/texel 50%", |r| number(r.error_px.p50, 2)),
+        ("95%", |r| number(r.error_px.p95, 2)),
+        ("max", |r| number(r.error_px.max, 1)),
+        ("culled", |r| percent(r.casters_culled)),
+        ("plan ms", |r| number(r.ms.plan, 3)),
+        ("depth ms", |r| number(r.ms.depth, 0)),
+        ("shade ms", |r| number(r.ms.shade, 0)),
     ];
-    let mut rows = vec![head.map(str::to_owned)];
-    rows.extend(report.results.iter().map(|r| {
-        let (m, e) = (&r.metrics, &r.error_px);
-        [
-            r.shadows.clone(),
-            r.maps.to_string(),
-            r.texels.to_string(),
-            percent(m.wrong_fraction),
-            percent(m.false_light),
-            number(m.mean_abs_error, 4),
-            number(m.flip, 4),
-            percent(r.flicker),
-            number(e.p50, 2),
-            number(e.p95, 2),
-            number(e.max, 1),
-            number(r.ms.plan, 3),
-            number(r.ms.depth, 0),
-            number(r.ms.shade, 0),
-        ]
-    }));
+    let is_measured = |name: &str| name != "flicker" || report.motion.is_some();
+    let columns = || COLUMNS.iter().filter(|(name, _)| is_measured(name));
+    let mut rows: Vec<Vec<String>> = vec![columns().map(|(name, _)| (*name).to_owned()).collect()];
+    rows.extend(report.results.iter().map(|r| columns().map(|(_, text)| text(r)).collect()));
     aligned(&rows)
 }
 

@@ -109,6 +109,11 @@ impl<'a> Comparison<'a> {
         Ok(Self { stage, options, onlooker, lamp, view, plans })
     }
 
+    /// That all frames of a motion exist.
+    pub(crate) fn check_motion(&self, motion: Motion, frames: u32) -> Result<()> {
+        motion.check(frames, self.onlooker.look, self.lamp.light)
+    }
+
     fn height(&self) -> u64 {
         u64::from(self.onlooker.camera.image()[1])
     }

@@ -41,6 +41,11 @@ impl Motion {
         }
     }
 
+    /// That all frames of the motion exist.
+    pub(crate) fn check(self, frames: u32, look: LookAt, light: Light) -> Result<()> {
+        (0..frames).try_for_each(|i| self.frame(look, light, i).map(drop))
+    }
+
     /// View and light of a frame; the first is as told.
     fn frame(self, look: LookAt, light: Light, index: u32) -> Result<(Camera, Light)> {
         let index = f64::from(index);
@@ -61,7 +66,9 @@ impl Motion {
                 match &mut frame.1 {
                     Light::Directional { direction } => *direction = turn * *direction,
                     Light::Spot(spot) => spot.direction = turn * spot.direction,
-                    Light::Point(_) => bail!("--motion: a point light has no direction to turn"),
+                    Light::Point(_) => bail!(
+                        "--motion: a point light has no direction to turn: take dolly or orbit"
+                    ),
                 }
             }
         }
@@ -76,7 +83,8 @@ struct Frame<'a> {
     plans: Vec<Plan>,
 }
 
-/// The share of pixels, for each technique, whose shadow changes between frames where the truth does not.
+/// How much every technique's shadows change, from frame to frame, where the truth does not: the mean change
+/// of visibility, which for hard shadows is the share of points that change.
 ///
 /// What a pixel shows is followed back into the frame before, where it must have been seen as well, and
 /// the truth and the technique are asked there again. So only shadows count that change on a point of a
@@ -98,7 +106,7 @@ pub(crate) fn flicker(
         Ok(Frame { view, plans })
     });
     let frames: Vec<Frame<'_>> = frames.collect::<Result<_>>()?;
-    let mut changed = vec![0u64; techniques.len()];
+    let mut change = vec![0f64; techniques.len()];
     let mut compared = 0u64;
     let mut before: Option<(&View<'_>, Vec<Reference<'_>>)> = None;
     for (i, frame) in frames.iter().enumerate() {
@@ -111,22 +119,22 @@ pub(crate) fn flicker(
             for rows in frame.view.bands() {
                 let band = frame.view.band(rows, &|_| {});
                 let steady = band.map(|s| steady(s, &frame.view, last_view), &|_| {});
-                compared += steady.iter().flatten().count() as u64;
-                for ((changed, now), last) in changed.iter_mut().zip(&now).zip(last) {
-                    *changed += steady
-                        .par_iter()
-                        .flatten()
-                        .filter(|[s, was]| {
-                            (now.visibility(0, s) - last.visibility(0, was)).abs() > 0.5
-                        })
-                        .count() as u64;
+                let steady: Vec<[Sample; 2]> = steady.into_iter().flatten().collect();
+                compared += steady.len() as u64;
+                for ((change, now), last) in change.iter_mut().zip(&now).zip(last) {
+                    let of = |[s, was]: &[Sample; 2]| {
+                        (now.visibility(0, s) - last.visibility(0, was)).abs()
+                    };
+                    // Summed up in one order, whatever the number of threads.
+                    let changes: Vec<f32> = steady.par_iter().map(of).collect();
+                    *change += changes.into_iter().map(f64::from).sum::<f64>();
                 }
             }
         }
         progress.advance(u64::from(look.image[1]));
         before = Some((&frame.view, now));
     }
-    Ok(changed.iter().map(|&n| (compared > 0).then(|| n as f64 / compared as f64)).collect())
+    Ok(change.iter().map(|sum| (compared > 0).then(|| sum / compared as f64)).collect())
 }
 
 /// A sample as it is and as it was in the frame before, if it counts in both and the truth about it has

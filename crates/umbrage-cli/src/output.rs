@@ -43,12 +43,14 @@ fn quoted(word: &str) -> String {
 }
 
 /// Rows of equally many cells as lines of text: the first column flush left, the others right.
-pub(crate) fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
-    let widths: [usize; N] =
-        std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
+pub(crate) fn aligned(rows: &[impl AsRef<[String]>]) -> String {
+    let rows: Vec<&[String]> = rows.iter().map(AsRef::as_ref).collect();
+    let columns = rows.iter().map(|r| r.len()).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
-    for row in rows {
-        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
+    for row in &rows {
+        for (i, (cell, &width)) in row.iter().zip(&widths).enumerate() {
             // Writing to a string cannot fail.
             let _ = match i {
                 0 => write!(text, "{cell:<width$}"),

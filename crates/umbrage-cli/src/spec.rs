@@ -183,11 +183,11 @@ fn warp_text(warp: Warp) -> String {
         Warp::Psm => "psm".into(),
         Warp::Lispsm => "lispsm".into(),
         Warp::Tsm { focus: None } => "tsm".into(),
-        Warp::Tsm { focus: Some(metres) } => format!("tsm(focus={metres})"),
+        Warp::Tsm { focus: Some(metres) } => format!("tsm(focus={})", Short(metres)),
         Warp::Adaptive(Objective::Storage) => "adaptive".into(),
         Warp::Adaptive(Objective::Area) => "adaptive(area)".into(),
         Warp::Log => "log".into(),
-        Warp::Lambda(metres) => format!("lambda={metres}"),
+        Warp::Lambda(metres) => format!("lambda={}", Short(metres)),
         // The planner may learn warps that this language has no name for yet.
         other => format!("{other:?}"),
     }
@@ -272,6 +272,16 @@ fn split_once(text: &str, at: char) -> (&str, Option<&str>) {
 
 fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+}
+
+/// A number in as few digits as tell it.
+struct Short(f64);
+
+impl Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_handy = self.0.is_infinite() || (1e-4..1e7).contains(&self.0);
+        if is_handy { write!(f, "{}", self.0) } else { write!(f, "{:e}", self.0) }
+    }
 }
 
 fn parse_count(text: &str, prefix: &str, range: std::ops::RangeInclusive<u32>) -> Result<u32> {

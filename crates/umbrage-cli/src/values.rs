@@ -13,7 +13,9 @@ const MAX_PICTURE_PIXELS: u64 = 1 << 26;
 pub(crate) fn vector(text: &str) -> Result<DVec3> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
-        [x, y, z] if text.matches(',').count() == 2 => position([x, y, z]),
+        [x, y, z] if text.matches(',').count() == 2 && !text.to_lowercase().contains("nan") => {
+            position([x, y, z])
+        }
         _ => bail!("must be three numbers x,y,z without spaces, as in 0,1.5,-4"),
     }
 }

@@ -121,8 +121,8 @@ pub struct Measured {
     /// Share of the triangles that need not be drawn into a map, the mean over maps that serve anything.
     #[serde(default)]
     pub casters_culled: Option<f64>,
-    /// Share of what counts in two frames whose shadow changes from one to the next although the truth
-    /// does not; `None` if nothing moved.
+    /// Mean change of visibility from one frame to the next, of what counts in both and where the truth does
+    /// not change; for hard shadows the share that changes. `None` if nothing moved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flicker: Option<f64>,
     /// Wall-clock times.

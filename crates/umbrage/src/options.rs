@@ -67,7 +67,8 @@ pub enum Warp {
     },
     /// The λ that makes the objective smallest over the receivers seen, and never larger than
     /// `Uniform` has it (under spot lights, with [`Objective::Area`]: by no more than one per cent). Where
-    /// sin θ < sin φ/4 it fades out.
+    /// sin θ < sin φ/4 it fades out. For thin strips, such as a slice of a flat floor, two values of λ can
+    /// be nearly as good; then a small motion may make it jump from one to the other.
     Adaptive(Objective),
     /// Logarithmic rows behind the λ = n/sin θ perspective: the unreachable optimum. Only the CPU
     /// reference can render it.

@@ -90,7 +90,7 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
         rare(share(column(
             "Flicker",
             "%",
-            "Points whose shadow changes between frames although the truth does not",
+            "Mean change of visibility between frames where the truth does not change",
             |r| r.flicker,
         ))),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),

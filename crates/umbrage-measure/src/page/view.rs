@@ -421,7 +421,7 @@ mod tests {
                 command: None,
             };
             let html = Html::new(&page).unwrap().render().unwrap();
-            ["<dt>Motion</dt><dd>orbit, 6 frames</dd>", "<dt>Flicker</dt><dd>The share of"]
+            ["<dt>Motion</dt><dd>orbit, 6 frames</dd>", "<dt>Flicker</dt><dd>The mean change"]
                 .map(|text| html.contains(text))
         };
         assert_eq!(shows(&report), [false, false]);

@@ -7,7 +7,8 @@ use crate::options::Objective;
 /// distance, the largest errors over the body are those at its vertices: m_s is a ratio of linear
 /// functions, m_t a square of one over another, which is convex. In ω = ln(1 + ν) the logarithm of
 /// m_t is convex too (each ln w_j is a log-sum-exp), and m_s adds little that is not: the sum has
-/// one valley, which a coarse scan brackets and a golden section narrows down.
+/// one valley for a view as a whole, and two at times for thin strips. A coarse scan brackets the lowest
+/// and a golden section narrows it down.
 pub(crate) fn least_error(family: &OnePoint, seen: &[Seen], objective: Objective) -> f64 {
     let cost = |omega: f64| cost(family, seen, objective, omega.exp_m1());
     // Beyond the view's own perspective every error grows.
