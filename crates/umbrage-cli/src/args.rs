@@ -1,5 +1,7 @@
 //! The command line: what may be asked for, parsed and checked, before any work begins.
 
+pub(crate) mod theory;
+
 use crate::figures;
 use crate::motion::Motion;
 use crate::spec::Technique;
@@ -48,6 +50,8 @@ pub(crate) enum Command {
     Scenes(Scenes),
     /// Compute the papers' figures again, from closed forms and from planned maps.
     Figures(Figures),
+    /// Compute the papers' closed forms: errors, storage, warps, the Fourier step.
+    Theory(theory::Theory),
 }
 
 /// `umbrage render`.
@@ -436,6 +440,7 @@ pub(crate) fn parse(
         Command::Sweep(sweep) => sweep.comparison.check(),
         Command::Plan(plan) => plan.check(),
         Command::Scenes(_) | Command::Figures(_) => Ok(()),
+        Command::Theory(theory) => theory.check(),
     };
     checked.map_err(|e| clap::Error::raw(clap::error::ErrorKind::ValueValidation, e))?;
     Ok((command, verbose))

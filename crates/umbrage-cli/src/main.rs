@@ -16,6 +16,7 @@ mod scenes;
 mod setup;
 mod spec;
 mod sweep;
+mod theory;
 mod values;
 
 use args::Command;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan::run(args),
         Command::Scenes(args) => scenes::run(args),
         Command::Figures(args) => figures::run(args, quiet),
+        Command::Theory(args) => theory::run(args),
     })
 }
 

@@ -316,7 +316,7 @@ fn nothing_served(onlooker: &Onlooker) -> String {
 }
 
 /// As many as there is any use in reading.
-fn six_digits(x: f64) -> f64 {
+pub(crate) fn six_digits(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 

@@ -193,7 +193,8 @@ fn warp_text(warp: Warp) -> String {
     }
 }
 
-fn parse_warp(text: &str) -> Result<Warp> {
+/// The part before everything else.
+pub(crate) fn parse_warp(text: &str) -> Result<Warp> {
     let (name, options) = split_options(text)?;
     if let Some(number) = name.strip_prefix("lambda=") {
         ensure!(options.is_none(), "`{text}`: `lambda=NUMBER` takes no options");

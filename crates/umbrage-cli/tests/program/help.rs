@@ -3,7 +3,9 @@ use crate::desk::Desk;
 #[test]
 fn every_command_has_help_with_an_example() {
     let desk = Desk::new();
-    for command in [&[][..], &["render"], &["compare"], &["sweep"], &["plan"], &["scenes"]] {
+    for command in
+        [&[][..], &["render"], &["compare"], &["sweep"], &["plan"], &["scenes"], &["theory"]]
+    {
         for flag in ["--help", "-h"] {
             let args = [command, &[flag]].concat();
             let run = desk.run(&args);
@@ -32,7 +34,7 @@ fn the_version_is_the_packages() {
 fn examples_of_the_help_parse() {
     // What needs no file of the user's must run as printed; the rest must be understood up to that.
     let desk = Desk::new();
-    for command in ["render", "compare", "sweep", "plan", "scenes"] {
+    for command in ["render", "compare", "sweep", "plan", "scenes", "theory"] {
         let help = desk.succeed(&[command, "--help"]);
         let examples = help.split("Examples:").nth(1).unwrap().replace("\\\n", " ");
         for example in examples.lines().map(str::trim).filter(|l| l.starts_with("umbrage")) {

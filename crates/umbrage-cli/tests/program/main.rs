@@ -10,3 +10,4 @@ mod plan;
 mod render;
 mod scenes;
 mod sweep;
+mod theory;

@@ -52,7 +52,7 @@ impl View {
     /// [`Error::Invalid`] with the field `theory.near`, `theory.far` or `theory.half_fov_rad`.
     pub fn new(near: f64, far: f64, half_fov_rad: f64) -> Result<Self, Error> {
         check(near >= 1e-12 && near.is_finite(), "theory.near", || {
-            format!("must be finite and at least 1e-12 metres, is {near}")
+            format!("must be finite and at least 1e-12 metres, is {near:?}")
         })?;
         check(far > near && far <= 1e12, "theory.far", || {
             format!("must exceed the near distance ({near}) and be at most 1e12 metres, is {far}")
@@ -109,6 +109,8 @@ impl View {
 /// A warp's λ: metres, at least 1e-12, or infinite for no warp.
 fn check_lambda(lambda: f64) -> Result<(), Error> {
     check(lambda >= 1e-12, "theory.lambda", || {
-        format!("must be a distance of at least 1e-12 metres, or infinite for no warp, is {lambda}")
+        format!(
+            "must be a distance of at least 1e-12 metres, or infinite for no warp, is {lambda:?}"
+        )
     })
 }
