@@ -528,6 +528,7 @@ impl Plan {
         {
             ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
         }
+        ensure!(self.fit == Fit::Box, "--fit surfaces needs a SCENE, whose surfaces they are");
         Ok(())
     }
 }

@@ -3,8 +3,10 @@
 mod bad_input;
 mod compare;
 mod desk;
+mod fit;
 mod goldens;
 mod help;
+mod motion;
 mod partitions;
 mod plan;
 mod render;
