@@ -64,12 +64,24 @@ impl PngPixel for Rgb {
 /// As [`write_file`].
 pub fn write_png<P: PngPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Result<(), Error> {
     let path = path.as_ref();
+    write_file(path, &encode_png(path, image)?)
+}
+
+/// The bytes of a PNG file, to be put into another file.
+///
+/// # Errors
+/// A picture that the encoder refuses.
+pub fn png<P: PngPixel>(image: &Image<P>) -> Result<Vec<u8>, Error> {
+    encode_png(Path::new("embedded picture"), image)
+}
+
+fn encode_png<P: PngPixel>(path: &Path, image: &Image<P>) -> Result<Vec<u8>, Error> {
     let [w, h] = image.size();
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
         .write_image(P::bytes(image.pixels()), w, h, P::COLOR)
         .map_err(|e| Error::Encode { path: path.to_owned(), reason: e.to_string() })?;
-    write_file(path, &bytes)
+    Ok(bytes)
 }
 
 /// A kind of pixel that EXR files hold.

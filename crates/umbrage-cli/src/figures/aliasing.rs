@@ -1,6 +1,6 @@
 //! Theory's Fig. 3: errors over a side view of V, and what they do to the shadows of a scene.
 
-use super::planned::{self, Planned};
+use super::planned::{Planned, from_before};
 use super::{Cell, Figure, File, Table, chart, contour, measured};
 use anyhow::Result;
 use base64::Engine;
@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_6;
 use std::fmt::Write;
 use umbrage::theory::{Errors, Rule, Tilted, View, Warped};
 use umbrage::visibility::Filter;
-use umbrage::{Bounds, Light, Objective, Options, Planner, Size};
+use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Planner, Size, Warp};
 use umbrage_measure::{Image, PngPixel, Rgb, grey, png};
 use umbrage_scene::Scene;
 use umbrage_trace::{Reference, Tracer, shade};
@@ -23,13 +23,18 @@ const TECHNIQUES: [(&str, Rule); 4] = [
     ("TSM", Rule::Tsm { focus: None }),
     ("adaptive", Rule::Adaptive(Objective::Storage)),
 ];
-const ERRORS: [(&str, fn(Errors) -> f64); 3] =
+/// One of the errors, or both.
+type Pick = fn(Errors) -> f64;
+
+const ERRORS: [(&str, Pick); 3] =
     [("E_p, along the map", |e| e.p), ("E_q, across", |e| e.q), ("E_p · E_q", |e| e.product())];
 
+/// Texels without anything in them.
+const EMPTY: Rgb = [205, 222, 240];
 /// Texels and pixels each way of map and picture: few, so that errors show as stairs.
 const SIDE: u32 = 256;
 /// The colours' ends, as powers of 5.
-const POWERS: [f64; 2] = [-1.0, 7.0];
+const POWERS: [f64; 2] = [0.0, 5.0];
 
 /// Pixels a metre in side views.
 const PER_METRE: f64 = 1.7;
@@ -52,8 +57,8 @@ impl Case {
     fn new(view: View, theta_rad: f64, rule: Rule) -> Result<Self> {
         let tilted = Tilted::new(view, theta_rad)?;
         let warped = tilted.warped(tilted.lambda(rule)?)?;
-        let warp = planned::warp(rule, warped.lambda());
-        Ok(Self { warped, planned: Planned::new(view, theta_rad, warp)? })
+        let planned = Planned::new(view, theta_rad, Warp::Lambda(warped.lambda()))?;
+        Ok(Self { warped, planned })
     }
 }
 
@@ -63,8 +68,16 @@ pub(super) fn theory_fig3() -> Result<Figure> {
     let scene = scene()?;
     let tracer = Tracer::new(&scene)?;
     let mut table = Table::new(&[
-        "theta_deg", "technique", "lambda_closed_m", "lambda_measured_m", "y_m", "z_m",
-        "e_q_closed", "e_q_measured", "e_p_closed", "e_p_measured",
+        "theta_deg",
+        "technique",
+        "lambda_closed_m",
+        "lambda_measured_m",
+        "y_m",
+        "z_m",
+        "e_q_closed",
+        "e_q_measured",
+        "e_p_closed",
+        "e_p_measured",
     ])?;
     let mut files = Vec::new();
     for (degrees, part) in [(90.0_f64, "90"), (60.0, "60"), (30.0, "30")] {
@@ -76,9 +89,16 @@ pub(super) fn theory_fig3() -> Result<Figure> {
                 let closed = case.warped.errors(y, z)?;
                 let measured = case.planned.errors(y, z);
                 table.row(&[
-                    Cell::from(degrees), name.into(), case.warped.lambda().into(),
-                    case.planned.lambda().into(), y.into(), z.into(), closed.q.into(),
-                    measured.q.into(), closed.p.into(), measured.p.into(),
+                    Cell::from(degrees),
+                    name.into(),
+                    case.warped.lambda().into(),
+                    case.planned.lambda().into(),
+                    y.into(),
+                    z.into(),
+                    closed.q.into(),
+                    measured.q.into(),
+                    closed.p.into(),
+                    measured.p.into(),
                 ])?;
             }
             cases.push(case);
@@ -88,7 +108,11 @@ pub(super) fn theory_fig3() -> Result<Figure> {
         );
         files.push(File::svg(part, about, sheet(view, degrees, &cases, &tracer)?));
     }
-    files.push(File::csv("", "Errors at points all over the side view, for each angle and technique", table)?);
+    files.push(File::csv(
+        "",
+        "Errors at points all over the side view, for each angle and technique",
+        table,
+    )?);
     Ok(Figure {
         name: "theory-fig3",
         title: "Where in the view the errors are".into(),
@@ -96,13 +120,14 @@ pub(super) fn theory_fig3() -> Result<Figure> {
         text: "Each field is the view frustum from its side, the viewer at its left tip, with parallel light that comes along the \
                arrow. Colours are errors measured from the matrices of planned maps, the lines the closed \
                form's at every power of 5: dark is fine, yellow is coarse. Beside them is the map itself (near is at its bottom, dark is close \
-               to the light), which is spent on 25 statues and their ground, and the shadows that it gives at 256 × 256 texels. Without a \
+               to the light), which is spent on 25 statues and their ground, and a detail of the shadows that it gives at 256 × 256 texels. Without a \
                warp (SSM) both errors are worst at the tip and fall with distance. Warps even them out along the \
                view; TSM is the strongest here, so it draws the foreground best and the distance worst. As the light tilts, \
                the errors come to depend on height: small at V's upper side, large at its lower one, which is where \
-               ground is. At θ = 30°, as much as φ, the view's upper side lies along the light and TSM's focus leaves it \
-               no warp. All maxima of E_p · E_q are at the lower near or far corner; adaptive makes those of E_p \
-               equal there."
+               ground is. At θ = 30°, as much as φ, the view's upper side lies along the light; LiSPSM hardly warps any more, TSM \
+               still does, and pays in V's lower half. All maxima of E_p · E_q are at the lower near or far corner; adaptive makes those of E_p \
+               equal there. It guards the worst point, wherever anybody looks, and so may do worse than no warp where the \
+               detail is."
             .into(),
         files,
     })
@@ -120,9 +145,9 @@ fn samples(view: View) -> impl Iterator<Item = (f64, f64)> {
 fn scene() -> Result<Scene> {
     let mut scene = umbrage_scene::builtin("statues", Some(5))?;
     let stand = DAffine3::from_scale_rotation_translation(
-        DVec3::splat(3.0),
-        DQuat::from_rotation_y(0.2),
-        DVec3::new(0.0, -8.5, -36.0),
+        DVec3::splat(2.5),
+        DQuat::from_rotation_y(0.25),
+        DVec3::new(0.0, -5.0, -23.0),
     );
     for instance in &mut scene.instances {
         instance.world_from_mesh = stand * instance.world_from_mesh;
@@ -170,7 +195,7 @@ fn sheet(view: View, degrees: f64, cases: &[Case], tracer: &Tracer<'_>) -> Resul
             let style = chart::text(size).pos(Pos::new(horizontal, vertical));
             area.draw(&Text::new(words.to_owned(), at, style))
         };
-        let headings = ERRORS.iter().map(|e| e.0).chain(["shadow map", "shadows"]);
+        let headings = ERRORS.iter().map(|e| e.0).chain(["shadow map", "shadows, detail"]);
         for (i, heading) in headings.enumerate() {
             let middle = layout.column(i) + if i < 3 { width } else { height } / 2;
             say(heading, (middle, TOP - 6), 14, HPos::Center, VPos::Bottom)?;
@@ -179,7 +204,8 @@ fn sheet(view: View, degrees: f64, cases: &[Case], tracer: &Tracer<'_>) -> Resul
             let middle = layout.row(i) + height / 2;
             say(name, (12, middle - 9), 14, HPos::Left, VPos::Center)?;
             let lambda = case.warped.lambda();
-            let lambda = if lambda.is_finite() { format!("λ = {lambda:.2} m") } else { "λ = ∞".into() };
+            let lambda =
+                if lambda.is_finite() { format!("λ = {lambda:.2} m") } else { "λ = ∞".into() };
             say(&lambda, (12, middle + 9), 13, HPos::Left, VPos::Center)?;
         }
         let foot = layout.row(cases.len()) - 4;
@@ -188,6 +214,8 @@ fn sheet(view: View, degrees: f64, cases: &[Case], tracer: &Tracer<'_>) -> Resul
             say("z = 1 m", (left, foot), 12, HPos::Left, VPos::Top)?;
             say("100 m", (left + width, foot), 12, HPos::Right, VPos::Top)?;
         }
+        let legend = "colours: measured; white lines: closed form at powers of 5";
+        say(legend, (layout.column(3), foot), 12, HPos::Left, VPos::Top)?;
         bar(area, layout.column(5) + 10, layout.row(0), layout.row(cases.len()) - GAP)
     })?;
     let mut over = String::new();
@@ -219,7 +247,13 @@ fn bar(area: &chart::Area<'_>, left: i32, top: i32, bottom: i32) -> Result<()> {
         let y = bottom - (f64::from(height) * place(5_f64.powi(power))).round() as i32;
         area.draw(&PathElement::new([(left + 16, y), (left + 20, y)], BLACK))?;
         let style = chart::text(12).pos(Pos::new(HPos::Left, VPos::Center));
-        area.draw(&Text::new(format!("{}", 5_f64.powi(power)), (left + 24, y), style))?;
+        let beyond = match f64::from(power) {
+            p if p == POWERS[0] => "≤ ",
+            p if p == POWERS[1] => "≥ ",
+            _ => "",
+        };
+        let mark = format!("{beyond}{}", 5_f64.powi(power));
+        area.draw(&Text::new(mark, (left + 24, y), style))?;
     }
     Ok(())
 }
@@ -230,7 +264,7 @@ fn place(error: f64) -> f64 {
 }
 
 /// The measured error over V.
-fn side_view(view: View, case: &Case, error: fn(Errors) -> f64) -> Result<Image<Rgb>> {
+fn side_view(view: View, case: &Case, error: Pick) -> Result<Image<Rgb>> {
     let per_metre = PER_METRE * FINENESS;
     let [width, height] = Layout::new(view).side_view.map(|n| (f64::from(n) * FINENESS) as u32);
     Ok(Image::from_fn([width, height], |column, row| {
@@ -245,7 +279,7 @@ fn side_view(view: View, case: &Case, error: fn(Errors) -> f64) -> Result<Image<
 }
 
 /// The closed form's lines at powers of 5.
-fn lines(view: View, case: &Case, error: fn(Errors) -> f64, [left, top]: [i32; 2]) -> Result<String> {
+fn lines(view: View, case: &Case, error: Pick, [left, top]: [i32; 2]) -> Result<String> {
     const COLUMNS: usize = 100;
     const ROWS: usize = 60;
     let middle = f64::from(Layout::new(view).side_view[1]) / 2.0;
@@ -299,12 +333,30 @@ fn embedded<P: PngPixel>([x, y]: [i32; 2], [w, h]: [i32; 2], image: &Image<P>) -
     ))
 }
 
-/// The shadow map of the scene, and the picture with its shadows.
-fn executed(view: View, theta_rad: f64, case: &Case, tracer: &Tracer<'_>) -> Result<[Image<Rgb>; 2]> {
-    let camera = measured::camera(view, SIDE)?;
-    let light = Light::Directional { direction: planned::from_before(theta_rad) };
+/// The part of the view whose shadows are shown.
+fn detail() -> Result<Camera> {
+    Ok(Camera::look_at(LookAt {
+        eye: DVec3::ZERO,
+        target: DVec3::new(0.4, -3.4, -16.0),
+        up: DVec3::Y,
+        fov_y_rad: 0.5,
+        near: 1.0,
+        far: 100.0,
+        image: [SIDE; 2],
+    })?)
+}
+
+/// The shadow map of the scene, and a picture with its shadows.
+fn executed(
+    view: View,
+    theta_rad: f64,
+    case: &Case,
+    tracer: &Tracer<'_>,
+) -> Result<[Image<Rgb>; 2]> {
+    let camera = measured::camera_of(view, SIDE)?;
+    let light = Light::Directional { direction: from_before(theta_rad) };
     let options = Options {
-        warp: umbrage::Warp::Lambda(case.planned.lambda()),
+        warp: Warp::Lambda(case.planned.lambda()),
         size: Size::Exact([SIDE; 2]),
         ..Options::default()
     };
@@ -318,9 +370,10 @@ fn executed(view: View, theta_rad: f64, case: &Case, tracer: &Tracer<'_>) -> Res
     let image = Image::from_fn([SIDE; 2], texel)?;
     let depths = || image.pixels().iter().copied().filter(|&d| d < 1.0);
     let (least, most) = (depths().fold(1.0, f32::min), depths().fold(0.0, f32::max));
-    let map = image.map(|&d| [grey((d - least) / (most - least).max(f32::MIN_POSITIVE)); 3]);
+    let range = (most - least).max(f32::MIN_POSITIVE);
+    let map = image.map(|&d| if d < 1.0 { [grey((d - least) / range); 3] } else { EMPTY });
 
-    let seen = umbrage_trace::View::new(tracer, camera, light, 1)?;
+    let seen = umbrage_trace::View::new(tracer, detail()?, light, 2)?;
     let mut pixels = Vec::new();
     for rows in seen.bands() {
         let band = seen.band(rows, &|_| {});

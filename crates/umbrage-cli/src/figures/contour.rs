@@ -10,9 +10,9 @@ pub(super) fn segments(values: &[f64], columns: usize, level: f64) -> Vec<[[f64;
             let [a, b] = [[column, row], [column + 1, row]];
             let [c, d] = [[column, row + 1], [column + 1, row + 1]];
             for triangle in [[a, b, d], [a, d, c]] {
-                found.extend(cut(triangle.map(|[x, y]| {
-                    ([x as f64, y as f64], values[y * columns + x] - level)
-                })));
+                found
+                    .extend(cut(triangle
+                        .map(|[x, y]| ([x as f64, y as f64], values[y * columns + x] - level))));
             }
         }
     }

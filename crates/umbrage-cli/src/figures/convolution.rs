@@ -25,6 +25,9 @@ fn from_basis_images(order: u32, attenuation: f64, receiver: f64, occluder: f64)
     0.5 + terms.sum::<f64>()
 }
 
+/// Depth of the occluder in Fig. 3, where 8 bits hold no sine exactly.
+const OCCLUDER: f64 = 0.47;
+
 /// A step with what is done to it, for both ways to compute it.
 #[derive(Clone, Copy)]
 struct Variant {
@@ -54,10 +57,10 @@ impl Variant {
         Ok(scale * self.step()?.series(x + offset))
     }
 
-    /// The same from 8-bit basis images of an occluder at depth 1/2.
+    /// The same from 8-bit basis images.
     fn stored(self, x: f64) -> Result<f64> {
         let [offset, scale] = self.adjustment()?;
-        Ok(scale * from_basis_images(self.order, self.attenuation, 0.5 - x - offset, 0.5))
+        Ok(scale * from_basis_images(self.order, self.attenuation, OCCLUDER - x - offset, OCCLUDER))
     }
 
     fn name(self) -> &'static str {
@@ -69,31 +72,46 @@ impl Variant {
     }
 }
 
+/// What a chart shows, with names.
+type Variants = [(String, Variant); 5];
+
 /// CSM, Fig. 3.
 pub(super) fn fig3() -> Result<Figure> {
-    let of_order = |attenuation, at| ORDERS.map(|m| (format!("M = {m}"), Variant::new(m, attenuation, at)));
+    let of_order =
+        |attenuation, at| ORDERS.map(|m| (format!("M = {m}"), Variant::new(m, attenuation, at)));
     let attenuated = [0.0, 0.5, 1.0, 2.0, 4.0]
         .map(|alpha| (format!("M = 8, α = {alpha}"), Variant::new(8, alpha, PLAIN)));
-    let parts: [(&str, &str, [(String, Variant); 5]); 4] = [
+    let parts: [(&str, &str, Variants); 4] = [
         ("orders", "(a) More terms: steeper, with ringing", of_order(0.0, PLAIN)),
         ("attenuation", "(b) Attenuation: less ringing, less steep", attenuated),
-        ("offset", "(c) Offset: lit where d = z", of_order(1.0, OFFSET)),
-        ("scale", "(d) Scaling by 2: lit where d = z, and steeper", of_order(1.0, SCALE)),
+        ("offset", "(c) Offset: lit where d = z", of_order(0.0, OFFSET)),
+        ("scale", "(d) Scaling by 2: lit where d = z, and steeper", of_order(0.0, SCALE)),
     ];
     let mut table = Table::new(&[
-        "part", "order", "attenuation", "adjustment", "d_minus_z", "closed", "measured",
+        "part",
+        "order",
+        "attenuation",
+        "adjustment",
+        "d_minus_z",
+        "closed",
+        "measured",
     ])?;
     let mut files = Vec::new();
-    let x = Axis::linear("receiver's depth less occluder's, d − z", [-0.5, 0.5]);
+    let x = Axis::linear("receiver's depth less occluder's, d − z", [-0.45, 0.45]);
     for (part, title, variants) in parts {
         let mut curves = Vec::new();
         for (i, (name, variant)) in variants.into_iter().enumerate() {
             let mut points = Vec::new();
-            for x in x.samples(201) {
+            for x in x.samples(181) {
                 let (closed, measured) = (variant.closed(-x)?, variant.stored(-x)?);
                 table.row(&[
-                    Cell::from(part), variant.order.into(), variant.attenuation.into(),
-                    variant.name().into(), x.into(), closed.into(), measured.into(),
+                    Cell::from(part),
+                    variant.order.into(),
+                    variant.attenuation.into(),
+                    variant.name().into(),
+                    x.into(),
+                    closed.into(),
+                    measured.into(),
                 ])?;
                 points.push((x, closed, measured));
             }
@@ -113,7 +131,11 @@ pub(super) fn fig3() -> Result<Figure> {
         };
         files.push(File::svg(part, title, chart.svg()?));
     }
-    files.push(File::csv("", "All curves, point by point; measured: from 8-bit basis images", table)?);
+    files.push(File::csv(
+        "",
+        "All curves, point by point; measured: from 8-bit basis images",
+        table,
+    )?);
     Ok(Figure {
         name: "csm-fig3",
         title: "A shadow test made of waves".into(),
@@ -125,7 +147,7 @@ pub(super) fn fig3() -> Result<Figure> {
                flattens the step. At d = z all these curves are at one half, which would leave every lit \
                surface half dark. (c) Shifting d by a fixed offset lets the curve be 1 there, and darkness begins the later the \
                smaller M is: light leaks in near contacts. (d) Doubling the sum instead keeps the shadow side where it was and \
-               makes the step twice as steep, at the price of harder edges. (c) and (d) have α = 1. Markers are the same sum \
+               makes the step twice as steep, at the price of harder edges. Markers are the same sum \
                from what a map stores, sines and cosines in 8 bits each. The paper expands the step of d − z, which \
                swaps light and shadow; here is the right sign."
             .into(),
@@ -135,8 +157,8 @@ pub(super) fn fig3() -> Result<Figure> {
 
 /// Depths in the scene of Fig. 6: the ground, the squares over it, and the slanted polygon's far end.
 const GROUND: f64 = 0.9;
-const LOW: f64 = 0.06;
-const HIGH: f64 = 0.4;
+const LOW: f64 = 0.15;
+const HIGH: f64 = 0.45;
 const SLANT: f64 = 0.5;
 
 /// CSM, Fig. 6.
@@ -148,10 +170,15 @@ pub(super) fn fig6() -> Result<Figure> {
         let mut points = Vec::new();
         for gap in gaps.samples(101) {
             let closed = shadow(m, OFFSET, gap)?;
-            let offset = FourierStep::new(m, ATTENUATION)?.offset();
-            let measured =
-                from_basis_images(m, ATTENUATION, GROUND - offset, GROUND - gap).clamp(0.0, 1.0);
-            table.row(&[Cell::from(m), "offset".into(), gap.into(), closed.into(), measured.into()])?;
+            let offset = FourierStep::new(m, 0.0)?.offset();
+            let measured = from_basis_images(m, 0.0, GROUND - offset, GROUND - gap).clamp(0.0, 1.0);
+            table.row(&[
+                Cell::from(m),
+                "offset".into(),
+                gap.into(),
+                closed.into(),
+                measured.into(),
+            ])?;
             points.push((gap, closed, measured));
         }
         curves.push(
@@ -172,13 +199,13 @@ pub(super) fn fig6() -> Result<Figure> {
         title: "How many terms a shadow needs".into(),
         source: "Fig. 6 of Annen et al. 2007",
         text: "The ground as the light sees it, with the shadows of two squares and of a polygon that rises from where \
-               it touches the ground. The upper square hangs at a height of 0.4 of the depth range and is dark \
-               with any M. The lower one hangs at 0.06, which is within the step's slope for small M, so light \
-               passes; the slanted polygon shows the whole slope at once, bright at its contact and dark only beyond. \
-               The curves below are cut along the polygon. In the upper row d is shifted by the offset, as in \
-               the paper's pictures, so lit ground is fully lit; the lower row scales by 2 instead, which is as good on the ground and darkens \
-               contacts sooner. What ringing is left shows as uneven darkness. α = 1; markers come from 8-bit \
-               basis images."
+               it touches the ground. One square hangs at a height of 0.45 of the depth range, the one below it at 0.15, \
+               which is within the step's slope for small M, so light passes where there should be none. The \
+               slanted polygon shows the whole slope at once, bright at its contact and dark beyond; the curves are a \
+               cut along it. In the upper row d is shifted by the offset, as in the paper's pictures, the \
+               lower row scales by 2 instead: both leave lit ground fully lit, and scaling darkens contacts sooner. With four \
+               terms both squares are dark, with sixteen the contact too. Uneven darkness is the series' \
+               ringing, which nothing dampens here. Markers come from 8-bit basis images."
             .into(),
         files: vec![
             File::svg("pictures", "Shadows of two squares and a slanted polygon for five orders", pictures()?),
@@ -188,12 +215,9 @@ pub(super) fn fig6() -> Result<Figure> {
     })
 }
 
-/// Calms most of the ringing.
-const ATTENUATION: f64 = 1.0;
-
 /// Light on the ground under an occluder this much nearer to the light.
 fn shadow(order: u32, at: StepAt, gap: f64) -> Result<f64> {
-    Ok(FourierStep::new(order, ATTENUATION)?.visibility(GROUND, GROUND - gap, at)?)
+    Ok(FourierStep::new(order, 0.0)?.visibility(GROUND, GROUND - gap, at)?)
 }
 
 /// The ground seen along the light, a column an order, a row a way to put lit surfaces right.
@@ -209,36 +233,41 @@ fn pictures() -> Result<String> {
     const LOWER: [i32; 4] = [12, 88, 50, 50];
     const POLYGON: [i32; 4] = [86, 12, 50, 126];
     let size = ((LEFT + 5 * STEP) as u32, (TOP + 2 * STEP) as u32 + chart::TITLE_HEIGHT);
-    chart::draw(size, "Shadows of two squares and a slanted polygon, seen along the light", |area| {
-        for (row, (at, name)) in (0..).zip([(OFFSET, "offset"), (SCALE, "scale")]) {
-            let y = TOP + STEP * row;
-            let style = chart::text(14).pos(Pos::new(HPos::Left, VPos::Center));
-            area.draw(&Text::new(name, (12, y + SIDE / 2), style))?;
-            for (column, m) in (0..).zip(ORDERS) {
-                let x = LEFT + STEP * column;
-                if row == 0 {
-                    let style = chart::text(14).pos(Pos::new(HPos::Center, VPos::Bottom));
-                    area.draw(&Text::new(format!("M = {m}"), (x + SIDE / 2, y - 6), style))?;
-                }
-                let rectangle = |[left, top, width, height]: [i32; 4], gap| -> Result<()> {
-                    // Lit ground is a bit darker than the page.
-                    let grey = (30.0 + 205.0 * shadow(m, at, gap)?).round() as u8;
-                    let corner = (x + left, y + top);
-                    let corners = [corner, (corner.0 + width, corner.1 + height)];
-                    let color = RGBColor(grey, grey, grey);
-                    Ok(area.draw(&Rectangle::new(corners, color.filled()))?)
-                };
-                rectangle([0, 0, SIDE, SIDE], 0.0)?;
-                rectangle(UPPER, HIGH)?;
-                rectangle(LOWER, LOW)?;
-                let [left, top, width, height] = POLYGON;
-                for i in 0..height / STRIP {
-                    // It touches the ground at its lower edge.
-                    let gap = SLANT * (1.0 - (f64::from(i) + 0.5) * f64::from(STRIP) / f64::from(height));
-                    rectangle([left, top + i * STRIP, width, STRIP], gap)?;
+    chart::draw(
+        size,
+        "Shadows of two squares and a slanted polygon, seen along the light",
+        |area| {
+            for (row, (at, name)) in (0..).zip([(OFFSET, "offset"), (SCALE, "scale")]) {
+                let y = TOP + STEP * row;
+                let style = chart::text(14).pos(Pos::new(HPos::Left, VPos::Center));
+                area.draw(&Text::new(name, (12, y + SIDE / 2), style))?;
+                for (column, m) in (0..).zip(ORDERS) {
+                    let x = LEFT + STEP * column;
+                    if row == 0 {
+                        let style = chart::text(14).pos(Pos::new(HPos::Center, VPos::Bottom));
+                        area.draw(&Text::new(format!("M = {m}"), (x + SIDE / 2, y - 6), style))?;
+                    }
+                    let rectangle = |[left, top, width, height]: [i32; 4], gap| -> Result<()> {
+                        // Lit ground is a bit darker than the page.
+                        let grey = (30.0 + 205.0 * shadow(m, at, gap)?).round() as u8;
+                        let corner = (x + left, y + top);
+                        let corners = [corner, (corner.0 + width, corner.1 + height)];
+                        let color = RGBColor(grey, grey, grey);
+                        Ok(area.draw(&Rectangle::new(corners, color.filled()))?)
+                    };
+                    rectangle([0, 0, SIDE, SIDE], 0.0)?;
+                    rectangle(UPPER, HIGH)?;
+                    rectangle(LOWER, LOW)?;
+                    let [left, top, width, height] = POLYGON;
+                    for i in 0..height / STRIP {
+                        // It touches the ground at its lower edge.
+                        let gap = SLANT
+                            * (1.0 - (f64::from(i) + 0.5) * f64::from(STRIP) / f64::from(height));
+                        rectangle([left, top + i * STRIP, width, STRIP], gap)?;
+                    }
                 }
             }
-        }
-        Ok(())
-    })
+            Ok(())
+        },
+    )
 }

@@ -11,6 +11,11 @@ use umbrage::{
 /// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that of
 /// resolutions left out.
 pub(super) fn camera(view: View) -> Result<Camera> {
+    camera_of(view, 1)
+}
+
+/// The same of so many pixels each way.
+pub(super) fn camera_of(view: View, side: u32) -> Result<Camera> {
     Ok(Camera::look_at(LookAt {
         eye: DVec3::ZERO,
         target: DVec3::NEG_Z,
@@ -18,7 +23,7 @@ pub(super) fn camera(view: View) -> Result<Camera> {
         fov_y_rad: 2.0 * view.half_fov_rad(),
         near: view.near(),
         far: view.far(),
-        image: [1; 2],
+        image: [side; 2],
     })?)
 }
 

@@ -50,10 +50,7 @@ impl Worst {
             lambda: [lambda, planned.lambda()],
             storage: [4.0 * extrema.storage_factor(), measured.product()],
             product: [extrema.product.largest.value, planned.largest_product(view)],
-            largest: [
-                [extrema.q.largest.value, extrema.p.largest.value],
-                [measured.q, measured.p],
-            ],
+            largest: [[extrema.q.largest.value, extrema.p.largest.value], [measured.q, measured.p]],
         })
     }
 }
@@ -85,13 +82,25 @@ pub(super) fn theta() -> Result<Figure> {
         })
         .collect::<Result<_>>()?;
     let mut table = Table::new(&[
-        "theta_deg", "warp", "lambda_closed_m", "lambda_measured_m", "storage_closed",
-        "storage_measured", "product_closed", "product_measured",
+        "theta_deg",
+        "warp",
+        "lambda_closed_m",
+        "lambda_measured_m",
+        "storage_closed",
+        "storage_measured",
+        "product_closed",
+        "product_measured",
     ])?;
     for w in &found {
         table.row(&[
-            Cell::from(w.x), RULES[w.rule].0.into(), w.lambda[0].into(), w.lambda[1].into(),
-            w.storage[0].into(), w.storage[1].into(), w.product[0].into(), w.product[1].into(),
+            Cell::from(w.x),
+            RULES[w.rule].0.into(),
+            w.lambda[0].into(),
+            w.lambda[1].into(),
+            w.storage[0].into(),
+            w.storage[1].into(),
+            w.product[0].into(),
+            w.product[1].into(),
         ])?;
     }
     let chart = |title: &str, label, range, value| {
@@ -117,10 +126,10 @@ pub(super) fn theta() -> Result<Figure> {
                texels that a map needs if no error is to exceed a given one. The second has the largest product at \
                any one point, the area of the worst texel. Light overhead is at the right end, where LiSPSM and \
                the adaptive warp for storage are one and need a hundredth of an even map. As the light tilts towards the view, LiSPSM's λ \
-               grows with 1/sin θ and its gain is lost before it must be; the adaptive warp follows the larger of the errors at V's \
+               grows with 1/sin θ and its gain is lost sooner than it need be; the adaptive warp follows the larger of the errors at V's \
                lower near and far corners instead and keeps both equal. The smallest texel \
-               area asks for a shorter λ, at some cost of storage. For θ below φ = 30° the whole view lies under the light \
-               from end to end and nobody gains much. Markers leave their lines in two places on purpose: the \
+               area asks for a shorter λ, at some cost of storage. Below θ = φ = 30° no warp gains much, and \
+               LiSPSM and TSM need more than an even map. Markers leave their lines in two places on purpose: the \
                planner fades the adaptive warps out where sin θ < sin φ/4, where the map is about to turn around, and never \
                lets TSM's warp be stronger than λ = n/sin θ."
             .into(),
@@ -137,30 +146,45 @@ pub(super) fn critical() -> Result<Figure> {
     const SHOWN: [usize; 4] = [0, 1, 3, 5];
     let ratio = Axis::log("depth ratio f/n", [2.0, 1e4]);
     let mut table = Table::new(&[
-        "theta_deg", "far_over_near", "warp", "critical_s_closed", "critical_s_measured",
-        "critical_t_closed", "critical_t_measured",
+        "theta_deg",
+        "far_over_near",
+        "warp",
+        "critical_s_closed",
+        "critical_s_measured",
+        "critical_t_closed",
+        "critical_t_measured",
     ])?;
     let mut files = Vec::new();
     for (degrees, part) in [(90.0_f64, "90"), (45.0, "45")] {
-        let cases: Vec<(usize, f64)> =
-            SHOWN.iter().flat_map(|&rule| ratio.samples(38).into_iter().map(move |r| (rule, r))).collect();
+        let cases: Vec<(usize, f64)> = SHOWN
+            .iter()
+            .flat_map(|&rule| ratio.samples(38).into_iter().map(move |r| (rule, r)))
+            .collect();
         let found: Vec<Worst> = cases
             .par_iter()
-            .map(|&(rule, r)| Worst::new(View::new(1.0, r, FRAC_PI_6)?, degrees.to_radians(), rule, r))
+            .map(|&(rule, r)| {
+                Worst::new(View::new(1.0, r, FRAC_PI_6)?, degrees.to_radians(), rule, r)
+            })
             .collect::<Result<_>>()?;
         for w in &found {
             // Half of E is the error of one pixel over one texel.
             let [closed, measured] = w.largest.map(|m| m.map(|e| e / 2.0));
             table.row(&[
-                Cell::from(degrees), w.x.into(), RULES[w.rule].0.into(), closed[0].into(),
-                measured[0].into(), closed[1].into(), measured[1].into(),
+                Cell::from(degrees),
+                w.x.into(),
+                RULES[w.rule].0.into(),
+                closed[0].into(),
+                measured[0].into(),
+                closed[1].into(),
+                measured[1].into(),
             ])?;
         }
         let mut curves = curves(&found, |w| w.storage.map(|m| m / 4.0), 4);
         if degrees == 90.0 {
-            let log = ratio.samples(80).into_iter().map(|r| {
-                Ok([r, View::new(1.0, r, FRAC_PI_6)?.log_error()])
-            });
+            let log = ratio
+                .samples(80)
+                .into_iter()
+                .map(|r| Ok([r, View::new(1.0, r, FRAC_PI_6)?.log_error()]));
             let log = log.collect::<Result<Vec<_>>>()?;
             curves.push(Curve::new("logarithmic").line(log).dashed().color(4));
         }
@@ -214,28 +238,42 @@ pub(super) fn gain() -> Result<Figure> {
         Ok(storage(planned::warp(over, lambda))? / storage(planned::warp(STORAGE, lambda))?)
     };
     let field = |title: &str, over| {
-        // All inputs are inside the axes' ranges, which are valid.
-        let value = |d, r| measured(d, r, over).unwrap_or(f64::NAN);
-        Panel::new(title, [angle.clone(), ratio.clone()], [40, 30], value)
+        Panel::new(title, [angle.clone(), ratio.clone()], [40, 30], |d, r| measured(d, r, over))
     };
     let map = HeatMaps {
         title: "Times fewer texels with adaptive than with LiSPSM, measured, φ = 30°".into(),
-        panels: vec![field("over LiSPSM as published", Rule::Lispsm), field("over LiSPSM, tilt's range", LISPSM)],
+        panels: vec![
+            field("over LiSPSM as published", Rule::Lispsm)?,
+            field("over LiSPSM, tilt's range", LISPSM)?,
+        ],
         columns: 2,
         panel_size: [400, 360],
-        color: Axis::log("gain, ratio of M_q·M_p", [1.0, 10.0]),
+        color: Axis::linear("gain, ratio of M_q·M_p", [1.0, 3.0]),
     };
-    let mut table = Table::new(&["over", "far_over_near", "theta_deg", "gain_closed", "gain_measured"])?;
+    let mut table =
+        Table::new(&["over", "far_over_near", "theta_deg", "gain_closed", "gain_measured"])?;
     let mut curves = Vec::new();
     for (i, r) in [10.0, 100.0, 1000.0, 10_000.0].into_iter().enumerate() {
         for over in [2, 3] {
             let (name, rule) = RULES[over];
             let rows = (30..=90_u32)
                 .into_par_iter()
-                .map(|d| Ok((f64::from(d), closed(f64::from(d), r, rule)?, measured(f64::from(d), r, rule)?)))
+                .map(|d| {
+                    Ok((
+                        f64::from(d),
+                        closed(f64::from(d), r, rule)?,
+                        measured(f64::from(d), r, rule)?,
+                    ))
+                })
                 .collect::<Result<Vec<_>>>()?;
             for &(d, closed, measured) in &rows {
-                table.row(&[Cell::from(name), r.into(), d.into(), closed.into(), measured.into()])?;
+                table.row(&[
+                    Cell::from(name),
+                    r.into(),
+                    d.into(),
+                    closed.into(),
+                    measured.into(),
+                ])?;
             }
             if rule == Rule::Lispsm {
                 let curve = Curve::new(format!("f/n = {r}"))
@@ -248,7 +286,7 @@ pub(super) fn gain() -> Result<Figure> {
     let lines = LineChart {
         title: "Gain of adaptive over LiSPSM as published, φ = 30°".into(),
         x: angle.clone(),
-        y: Axis::log("gain, ratio of M_q·M_p", [1.0, 10.0]),
+        y: Axis::linear("gain, ratio of M_q·M_p", [1.0, 3.0]),
         curves,
         notes: Vec::new(),
     };
@@ -257,7 +295,7 @@ pub(super) fn gain() -> Result<Figure> {
         title: "What adapting the warp to the light's angle gains".into(),
         source: "the direction-adaptive warp that Zhang, Zhao and Sun 2009 name as future work",
         text: "How many times the texels LiSPSM needs that the adaptive warp needs for the same guaranteed error. \
-               Overhead (θ = 90°) the two are the same. With the tilt the gain grows, the more so the deeper the view: \
+               Overhead (θ = 90°) the two are the same. It grows as light and view close in on each other, towards θ = φ the more the deeper the view: \
                LiSPSM's rule is derived for light overhead and carried over by 1/sin θ, which weakens the \
                warp just where V's lower near corner needs it. The advice in LiSPSM's §4.4, to take the tilt's shorter \
                range for f, gives back part of it (right-hand map). Below θ = φ, not shown, both tend to no warp. \

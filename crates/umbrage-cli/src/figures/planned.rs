@@ -64,7 +64,8 @@ impl Planned {
 
     /// The largest E_q·E_p at any one point of V: at one of its corners, by Theory §3.1.
     pub(super) fn largest_product(&self, view: View) -> f64 {
-        let corners = [view.near(), view.far()].into_iter().flat_map(|z| [-z, z].map(|side| (side, z)));
+        let corners =
+            [view.near(), view.far()].into_iter().flat_map(|z| [-z, z].map(|side| (side, z)));
         corners.map(|(y, z)| self.errors(y * view.tan_phi(), z).product()).fold(0.0, f64::max)
     }
 }
