@@ -29,7 +29,7 @@ type Pick = fn(Errors) -> f64;
 const ERRORS: [(&str, Pick); 3] =
     [("E_p, along the map", |e| e.p), ("E_q, across", |e| e.q), ("E_p · E_q", |e| e.product())];
 
-/// Texels without anything in them.
+/// Texels in which nothing lies before the end of what the map serves.
 const EMPTY: Rgb = [205, 222, 240];
 /// Texels and pixels each way of map and picture: few, so that errors show as stairs.
 const SIDE: u32 = 256;
@@ -70,13 +70,13 @@ pub(super) fn theory_fig3() -> Result<Figure> {
     let mut table = Table::new(&[
         "theta_deg",
         "technique",
-        "lambda_closed_m",
-        "lambda_measured_m",
+        "lambda_m",
+        "lambda_m_measured",
         "y_m",
         "z_m",
-        "e_q_closed",
+        "e_q",
         "e_q_measured",
-        "e_p_closed",
+        "e_p",
         "e_p_measured",
     ])?;
     let mut files = Vec::new();
@@ -373,7 +373,7 @@ fn executed(
     let range = (most - least).max(f32::MIN_POSITIVE);
     let map = image.map(|&d| if d < 1.0 { [grey((d - least) / range); 3] } else { EMPTY });
 
-    let seen = umbrage_trace::View::new(tracer, detail()?, light, 2)?;
+    let seen = umbrage_trace::View::new(tracer, detail()?, light, 1)?;
     let mut pixels = Vec::new();
     for rows in seen.bands() {
         let band = seen.band(rows, &|_| {});

@@ -93,8 +93,8 @@ pub(super) fn fig3() -> Result<Figure> {
         "attenuation",
         "adjustment",
         "d_minus_z",
-        "closed",
-        "measured",
+        "light",
+        "light_measured",
     ])?;
     let mut files = Vec::new();
     let x = Axis::linear("receiver's depth less occluder's, d − z", [-0.45, 0.45]);
@@ -121,11 +121,11 @@ pub(super) fn fig3() -> Result<Figure> {
                     .markers(points.iter().skip(2 * i).step_by(10).map(|p| [p.0, p.2])),
             );
         }
-        let top = if part == "scale" { 2.2 } else { 1.2 };
+        let range = if part == "scale" { [-0.4, 2.4] } else { [-0.2, 1.2] };
         let chart = LineChart {
             title: title.to_owned(),
             x: x.clone(),
-            y: Axis::linear("light that passes, before the clamp to 0 … 1", [-0.2, top]),
+            y: Axis::linear("light that passes, before the clamp to 0 … 1", range),
             curves,
             notes: Vec::new(),
         };
@@ -163,7 +163,7 @@ const SLANT: f64 = 0.5;
 
 /// CSM, Fig. 6.
 pub(super) fn fig6() -> Result<Figure> {
-    let mut table = Table::new(&["order", "adjustment", "gap", "closed", "measured"])?;
+    let mut table = Table::new(&["order", "adjustment", "gap", "light", "light_measured"])?;
     let gaps = Axis::linear("height of the occluder over the receiver, z-range = 1", [0.0, SLANT]);
     let mut curves = Vec::new();
     for (i, m) in ORDERS.into_iter().enumerate() {

@@ -22,7 +22,7 @@ struct Misprint {
 /// All of them.
 pub(super) fn misprints() -> Result<Figure> {
     let found = found()?;
-    let mut table = Table::new(&["place", "quantity", "printed", "closed", "measured"])?;
+    let mut table = Table::new(&["place", "quantity", "value_printed", "value", "value_measured"])?;
     for m in &found {
         table.row(&[
             Cell::from(m.place),
@@ -46,7 +46,7 @@ pub(super) fn misprints() -> Result<Figure> {
             .into(),
         files: vec![
             File::svg("", "For each formula, printed and corrected value in proportion to the measured one", drawn(&found)?),
-            File::csv("", "For each formula: its value as printed, put right (closed), and measured", table)?,
+            File::csv("", "For each formula: its value as printed, put right, and measured", table)?,
         ],
     })
 }

@@ -84,11 +84,11 @@ pub(super) fn theta() -> Result<Figure> {
     let mut table = Table::new(&[
         "theta_deg",
         "warp",
-        "lambda_closed_m",
-        "lambda_measured_m",
-        "storage_closed",
+        "lambda_m",
+        "lambda_m_measured",
+        "storage",
         "storage_measured",
-        "product_closed",
+        "product",
         "product_measured",
     ])?;
     for w in &found {
@@ -149,9 +149,9 @@ pub(super) fn critical() -> Result<Figure> {
         "theta_deg",
         "far_over_near",
         "warp",
-        "critical_s_closed",
+        "critical_s",
         "critical_s_measured",
-        "critical_t_closed",
+        "critical_t",
         "critical_t_measured",
     ])?;
     let mut files = Vec::new();
@@ -250,8 +250,7 @@ pub(super) fn gain() -> Result<Figure> {
         panel_size: [400, 360],
         color: Axis::linear("gain, ratio of M_q·M_p", [1.0, 3.0]),
     };
-    let mut table =
-        Table::new(&["over", "far_over_near", "theta_deg", "gain_closed", "gain_measured"])?;
+    let mut table = Table::new(&["over", "far_over_near", "theta_deg", "gain", "gain_measured"])?;
     let mut curves = Vec::new();
     for (i, r) in [10.0, 100.0, 1000.0, 10_000.0].into_iter().enumerate() {
         for over in [2, 3] {
