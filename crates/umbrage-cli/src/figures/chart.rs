@@ -8,19 +8,21 @@ use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, Value
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use rayon::prelude::*;
 use std::ops::Range;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Context<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
 /// Size of a line chart, pixels, the legend's column at its right included.
 const SIZE: (u32, u32) = (880, 480);
 const LEGEND_WIDTH: u32 = 230;
 const COLOR_BAR_WIDTH: u32 = 110;
-const TITLE_HEIGHT: u32 = 34;
+/// Height of the title above what is drawn, pixels.
+pub(super) const TITLE_HEIGHT: u32 = 34;
 
 /// Okabe and Ito's palette without its yellow, which is faint on white.
-const COLORS: [RGBColor; 7] = [
+pub(super) const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -73,10 +75,12 @@ impl Axis {
     pub(super) fn at(&self, share: f64) -> f64 {
         let [a, b] = self.range.map(|v| self.place(v));
         let placed = a + (b - a) * share;
-        match self.scale {
+        let value = match self.scale {
             Scale::Linear => placed,
             Scale::Log => 10_f64.powf(placed),
-        }
+        };
+        // Rounding must not leave the axis, where there may be no formula.
+        value.clamp(self.range[0], self.range[1])
     }
 
     /// `count` values along the axis, both ends among them.
@@ -140,13 +144,16 @@ impl Ranged for Axis {
 
 impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, value: &f64) -> String {
-        number(*value)
+        // Marks of linear axes are sums: rounding makes something tiny of their zero.
+        let [a, b] = self.range;
+        let is_zero = self.scale == Scale::Linear && value.abs() < 1e-9 * (b - a).abs();
+        number(if is_zero { 0.0 } else { *value })
     }
 }
 
 /// A round number in few letters: powers of ten where it is long.
 fn number(value: f64) -> String {
-    if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+    if value == 0.0 || (1e-3..1e4).contains(&value.abs()) {
         // Marks of even axes are sums, with rounding at their ends.
         return format!("{}", (value * 1e6).round() / 1e6);
     }
@@ -326,15 +333,31 @@ impl Panel {
         title: impl Into<String>,
         [x, y]: [Axis; 2],
         [columns, rows]: [usize; 2],
-        value: impl Fn(f64, f64) -> f64 + Sync,
-    ) -> Self {
-        use rayon::prelude::*;
+        value: impl Fn(f64, f64) -> Result<f64> + Sync,
+    ) -> Result<Self> {
+        let places = (0..rows * columns).into_par_iter();
+        let mut panel = Self { title: title.into(), x, y, columns, values: Vec::new() };
+        let value = |i| {
+            let [x, y] = panel.middle(i, rows);
+            value(x, y)
+        };
+        panel.values = places.map(value).collect::<Result<_>>()?;
+        Ok(panel)
+    }
+
+    /// The middle of the i-th cell.
+    fn middle(&self, i: usize, rows: usize) -> [f64; 2] {
         let middle = |axis: &Axis, i: usize, n: usize| axis.at((i as f64 + 0.5) / n as f64);
-        let values = (0..rows * columns)
-            .into_par_iter()
-            .map(|i| value(middle(&x, i % columns, columns), middle(&y, i / columns, rows)))
-            .collect();
-        Self { title: title.into(), x, y, columns, values }
+        [middle(&self.x, i % self.columns, self.columns), middle(&self.y, i / self.columns, rows)]
+    }
+
+    /// x, y and value of every cell, row by row.
+    pub(super) fn cells(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+        let rows = self.values.len() / self.columns;
+        self.values.iter().enumerate().map(move |(i, &value)| {
+            let [x, y] = self.middle(i, rows);
+            (x, y, value)
+        })
     }
 
     fn draw(&self, area: &Area<'_>, color: &Axis) -> Result<()> {
@@ -411,13 +434,14 @@ impl HeatMaps {
             .y_desc(self.color.label.clone())
             .y_label_style(text(12))
             .axis_desc_style(text(13))
+            .set_all_tick_mark_size(5)
             .draw()?;
         Ok(())
     }
 }
 
 /// The colour of a share of 0 to 1.
-fn viridis(share: f64) -> RGBColor {
+pub(super) fn viridis(share: f64) -> RGBColor {
     let at = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
     let mix = |a: u8, b: u8| {
@@ -427,12 +451,13 @@ fn viridis(share: f64) -> RGBColor {
     RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }
 
-fn text(size: u32) -> TextStyle<'static> {
+/// Black words of this size, pixels.
+pub(super) fn text(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_text_style(&(1, 1)).color(&BLACK)
 }
 
 /// An SVG with a title, drawn below it.
-fn draw(
+pub(super) fn draw(
     size: (u32, u32),
     title: &str,
     content: impl FnOnce(&Area<'_>) -> Result<()>,

@@ -1,9 +1,16 @@
 //! `umbrage figures`: the papers' figures and tables once more, from the closed forms and from maps that
 //! were really planned.
 
+mod aliasing;
 mod chart;
+mod contour;
+mod convolution;
 mod lispsm;
 mod measured;
+mod misprints;
+mod ours;
+mod planned;
+mod warping;
 
 use crate::args;
 use crate::output::{Contents, ReportFolder, command_line};
@@ -33,11 +40,17 @@ struct File {
     /// What it shows, for those who cannot see it; for tables, what their rows are.
     about: String,
     bytes: Vec<u8>,
+    /// Whether the page shows what is in a table.
+    is_table_shown: bool,
 }
 
 impl Figure {
     fn shown(&self) -> FigureShown {
-        let file = |f: &File| FigureFile { file: f.name(self.name), about: f.about.clone() };
+        let file = |f: &File| FigureFile {
+            file: f.name(self.name),
+            about: f.about.clone(),
+            rows: f.rows(),
+        };
         FigureShown {
             name: self.name.to_owned(),
             title: self.title.clone(),
@@ -51,17 +64,30 @@ impl Figure {
 impl File {
     /// A drawing.
     fn svg(part: &'static str, about: impl Into<String>, svg: String) -> Self {
-        Self { part, extension: "svg", about: about.into(), bytes: svg.into_bytes() }
+        let bytes = svg.into_bytes();
+        Self { part, extension: "svg", about: about.into(), bytes, is_table_shown: false }
     }
 
     /// A table.
     fn csv(part: &'static str, about: impl Into<String>, table: Table) -> Result<Self> {
-        Ok(Self { part, extension: "csv", about: about.into(), bytes: table.finish()? })
+        let bytes = table.finish()?;
+        Ok(Self { part, extension: "csv", about: about.into(), bytes, is_table_shown: false })
     }
 
-    /// A picture of pixels.
-    fn png(part: &'static str, about: impl Into<String>, bytes: Vec<u8>) -> Self {
-        Self { part, extension: "png", about: about.into(), bytes }
+    /// A table so small that the page shows it.
+    fn shown_csv(part: &'static str, about: impl Into<String>, table: Table) -> Result<Self> {
+        Ok(Self { is_table_shown: true, ..Self::csv(part, about, table)? })
+    }
+
+    /// What the page shows of a table: the headings first, numbers rounded.
+    fn rows(&self) -> Vec<Vec<String>> {
+        if !self.is_table_shown {
+            return Vec::new();
+        }
+        let mut csv = csv::ReaderBuilder::new().has_headers(false).from_reader(&*self.bytes);
+        let cell = |cell: &str| cell.parse().map_or(cell.to_owned(), rounded);
+        // It was written here, so it can be read.
+        csv.records().flatten().map(|row| row.iter().map(cell).collect()).collect()
     }
 
     fn name(&self, figure: &str) -> String {
@@ -120,11 +146,36 @@ impl<'a> From<&'a str> for Cell<'a> {
     }
 }
 
+/// Five digits of a number.
+fn rounded(n: f64) -> String {
+    if n == 0.0 || !n.is_finite() {
+        return n.to_string();
+    }
+    let unit = 10_f64.powi(4 - n.abs().log10().floor() as i32);
+    format!("{}", (n * unit).round() / unit)
+}
+
 /// How a figure is made.
 type Make = fn() -> Result<Figure>;
 
 /// All figures, in the page's order.
-const FIGURES: &[(&str, Make)] = &[("lispsm-fig6", lispsm::fig6)];
+const FIGURES: &[(&str, Make)] = &[
+    ("lispsm-fig6", lispsm::fig6),
+    ("wp-fig5", warping::fig5),
+    ("wp-fig6", warping::fig6),
+    ("wp-fig7", warping::fig7),
+    ("wp-fig10", warping::fig10),
+    ("wp-fig12", warping::fig12),
+    ("wp-fig13", warping::fig13),
+    ("wp-storage", warping::storage),
+    ("theory-fig3", aliasing::theory_fig3),
+    ("csm-fig3", convolution::fig3),
+    ("csm-fig6", convolution::fig6),
+    ("ours-theta", ours::theta),
+    ("ours-critical", ours::critical),
+    ("ours-gain", ours::gain),
+    ("misprints", misprints::misprints),
+];
 
 /// The names of all figures.
 pub(crate) fn names() -> impl Iterator<Item = &'static str> {
@@ -135,7 +186,7 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
 pub(crate) fn may_have_made(file: &str) -> bool {
     let Some((stem, extension)) = file.rsplit_once('.') else { return false };
     let rest = names().filter_map(|name| stem.strip_prefix(name));
-    ["svg", "csv", "png"].contains(&extension)
+    ["svg", "csv"].contains(&extension)
         && rest.into_iter().any(|r| r.is_empty() || r.starts_with('-'))
 }
 

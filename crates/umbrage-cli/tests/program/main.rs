@@ -3,6 +3,7 @@
 mod bad_input;
 mod compare;
 mod desk;
+mod figures;
 mod fit;
 mod goldens;
 mod help;

@@ -36,6 +36,9 @@ pub struct FigureFile {
     pub file: String,
     /// What it shows, for those who cannot see it, or what a table's rows are.
     pub about: String,
+    /// What the page shows of a table, the headings first; empty for all else.
+    #[serde(skip)]
+    pub rows: Vec<Vec<String>>,
 }
 
 impl FigureFile {
