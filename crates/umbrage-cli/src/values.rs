@@ -16,7 +16,7 @@ pub(crate) fn vector(text: &str) -> Result<DVec3> {
         [x, y, z] if text.matches(',').count() == 2 && !text.to_lowercase().contains("nan") => {
             position([x, y, z])
         }
-        _ => bail!("must be three numbers x,y,z without spaces, as in 0,1.5,-4"),
+        _ => bail!("must be three finite numbers x,y,z without spaces, as in 0,1.5,-4"),
     }
 }
 

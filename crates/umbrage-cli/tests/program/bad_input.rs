@@ -39,7 +39,7 @@ fn shared_options() {
     for (options, expected) in [
         (&["--eye", "1,2"][..], "--eye"),
         (&["--eye", "1,2"], "three numbers"),
-        (&["--eye", "1,2,NaN"], "within 1e12"),
+        (&["--eye", "1,2,NaN"], "three finite numbers"),
         (&["--eye", "0,0,1e300"], "within 1e12"),
         (&["--eye"], "--eye"),
         (&["--eye", "--target", "0,0,0"], "0,0,0"),
