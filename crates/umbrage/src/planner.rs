@@ -18,6 +18,29 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// Plans shadow maps. Keep one per view: its buffers are reused, so that planning allocates nothing
 /// once they have grown.
+///
+/// Two lights share 2048² texels over four slices each; which maps answer for a point, whether a box may
+/// cast into one, and where they lie in an atlas:
+///
+/// ```
+/// # use umbrage::*;
+/// # use glam::dvec3;
+/// # let camera = Camera::look_at(LookAt { eye: dvec3(0.0, 2.0, 0.0), target: dvec3(0.0, 1.0, -9.0), up: dvec3(0.0, 1.0, 0.0),
+/// #     fov_y_rad: 1.0, near: 0.1, far: 200.0, image: [1280, 720] })?;
+/// # let torch = SpotLight { position: dvec3(4.0, 5.0, -9.0), direction: dvec3(-0.5, -1.0, -0.3), half_angle_rad: 0.6, near: 0.1, range: 30.0 };
+/// let lights = [Light::Directional { direction: dvec3(0.3, -1.0, 0.2) }, Light::Spot(torch)];
+/// let bounds = Bounds::of_scene(Aabb::new(dvec3(-50.0, 0.0, -90.0), dvec3(50.0, 9.0, 10.0)));
+/// let partition = Partition { splits: Splits::Fitted, overlap: 0.1, ..Partition::slices(4) };
+/// let options = Options { partition, size: Size::Budget(2048 * 2048), ..Options::default() };
+/// let mut planner = Planner::new();
+/// let plan = planner.plan(&camera, &lights, &bounds, &options)?;
+/// let (map, share) = plan.lookup(0, dvec3(1.0, 0.0, -9.0)).next().expect("a map of the sun's");
+/// let tree = Aabb::new(dvec3(0.0, 0.0, -10.0), dvec3(2.0, 7.0, -8.0));
+/// assert!(plan.maps[map].may_cast(tree) && share > 0.0);
+/// let atlas = Atlas::packed(plan, 2, 8192)?;
+/// assert_eq!(atlas.places.len(), 8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Planner {
     plan: Plan,
