@@ -110,7 +110,7 @@ pub(super) fn theory_fig3() -> Result<Figure> {
     }
     files.push(File::csv(
         "",
-        "Errors at points all over the side view, for each angle and technique",
+        "errors at points all over the side view, for each angle and technique",
         table,
     )?);
     Ok(Figure {
@@ -120,7 +120,7 @@ pub(super) fn theory_fig3() -> Result<Figure> {
         text: "Each field is the view frustum from its side, the viewer at its left tip, with parallel light that comes along the \
                arrow. Colours are errors measured from the matrices of planned maps, the lines the closed \
                form's at every power of 5: dark is fine, yellow is coarse. Beside them is the map itself (near is at its bottom, dark is close \
-               to the light), which is spent on 25 statues and their ground, and a detail of the shadows that it gives at 256 × 256 texels. Without a \
+               to the light, pale blue where nothing lies before V's far sides), which is spent on 25 statues and their ground, and a detail of the shadows that it gives at 256 × 256 texels. Without a \
                warp (SSM) both errors are worst at the tip and fall with distance. Warps even them out along the \
                view; TSM is the strongest here, so it draws the foreground best and the distance worst. As the light tilts, \
                the errors come to depend on height: small at V's upper side, large at its lower one, which is where \
@@ -240,7 +240,8 @@ fn bar(area: &chart::Area<'_>, left: i32, top: i32, bottom: i32) -> Result<()> {
     let height = bottom - top;
     for y in 0..height {
         let share = 1.0 - f64::from(y) / f64::from(height);
-        let corners = [(left, top + y), (left + 16, top + y + 1)];
+        // To the end: where each only touched the next, seams would show.
+        let corners = [(left, top + y), (left + 16, bottom)];
         area.draw(&Rectangle::new(corners, chart::viridis(share).filled()))?;
     }
     for power in POWERS[0] as i32..=POWERS[1] as i32 {

@@ -133,13 +133,13 @@ pub(super) fn fig3() -> Result<Figure> {
     }
     files.push(File::csv(
         "",
-        "All curves, point by point; measured: from 8-bit basis images",
+        "all curves, point by point; measured: from 8-bit basis images",
         table,
     )?);
     Ok(Figure {
         name: "csm-fig3",
         title: "A shadow test made of waves".into(),
-        source: "Fig. 3 of Annen et al. 2007",
+        source: "Annen, Mertens, Bekaert, Seidel and Kautz 2007, Figure 3",
         text: "A shadow test is a step: light where the receiver's depth d is at most the stored depth z, dark beyond. \
                Convolution shadow maps replace the step by the first M waves of its Fourier series, which can be \
                blurred like any picture. (a) With more terms the step is steeper, but it keeps swinging about 0 and 1; the first \
@@ -197,7 +197,7 @@ pub(super) fn fig6() -> Result<Figure> {
     Ok(Figure {
         name: "csm-fig6",
         title: "How many terms a shadow needs".into(),
-        source: "Fig. 6 of Annen et al. 2007",
+        source: "Annen, Mertens, Bekaert, Seidel and Kautz 2007, Figure 6",
         text: "The ground as the light sees it, with the shadows of two squares and of a polygon that rises from where \
                it touches the ground. One square hangs at a height of 0.45 of the depth range, the one below it at 0.15, \
                which is within the step's slope for small M, so light passes where there should be none. The \
@@ -210,7 +210,7 @@ pub(super) fn fig6() -> Result<Figure> {
         files: vec![
             File::svg("pictures", "Shadows of two squares and a slanted polygon for five orders", pictures()?),
             File::svg("cut", "Light over the height of the occluder for five orders", chart.svg()?),
-            File::csv("", "The curves, point by point", table)?,
+            File::csv("", "the curves, point by point", table)?,
         ],
     })
 }

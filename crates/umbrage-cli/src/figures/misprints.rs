@@ -46,7 +46,7 @@ pub(super) fn misprints() -> Result<Figure> {
             .into(),
         files: vec![
             File::svg("", "For each formula, printed and corrected value in proportion to the measured one", drawn(&found)?),
-            File::shown_csv("", "For each formula: its value as printed, put right, and measured", table)?,
+            File::shown_csv("", "for each formula: its value as printed, put right, and measured", table)?,
         ],
     })
 }

@@ -119,24 +119,25 @@ pub(super) fn theta() -> Result<Figure> {
     Ok(Figure {
         name: "ours-theta",
         title: "The worst error at every angle of light".into(),
-        source: "§3.1 and the conclusion of Zhang, Zhao and Sun 2009, worked out",
+        source: "Zhang, Zhao and Sun 2009, §3.1 and the conclusion, worked out",
         text: "Theory shows the errors of three warps at three angles and names a warp that adapts to the angle as \
                future work. Here is every warp at every angle, judged in two ways. The first chart has the product of the \
-               largest error across the map and the largest along it, wherever each may be: it counts the \
+               largest error across the map and the largest along it, wherever each may be: in proportion to it are the \
                texels that a map needs if no error is to exceed a given one. The second has the largest product at \
                any one point, the area of the worst texel. Light overhead is at the right end, where LiSPSM and \
                the adaptive warp for storage are one and need a hundredth of an even map. As the light tilts towards the view, LiSPSM's λ \
                grows with 1/sin θ and its gain is lost sooner than it need be; the adaptive warp follows the larger of the errors at V's \
                lower near and far corners instead and keeps both equal. The smallest texel \
                area asks for a shorter λ, at some cost of storage. Below θ = φ = 30° no warp gains much, and \
-               LiSPSM and TSM need more than an even map. Markers leave their lines in two places on purpose: the \
+               LiSPSM and TSM need more than an even map; just above it PSM's warp is so strong (λ = 0.1 m) that it does \
+               more harm than good. Markers leave their lines in two places on purpose: the \
                planner fades the adaptive warps out where sin θ < sin φ/4, where the map is about to turn around, and never \
                lets TSM's warp be stronger than λ = n/sin θ."
             .into(),
         files: vec![
             File::svg("storage", "M_q·M_p over θ, a curve for each warp", storage),
             File::svg("product", "Largest E_q·E_p over θ, a curve for each warp", product),
-            File::csv("", "For each whole degree and warp: λ, M_q·M_p and the largest E_q·E_p", table)?,
+            File::csv("", "for each whole degree and warp: λ, M_q·M_p and the largest E_q·E_p", table)?,
         ],
     })
 }
@@ -200,14 +201,14 @@ pub(super) fn critical() -> Result<Figure> {
     }
     files.push(File::csv(
         "",
-        "For each angle, depth ratio and warp: the critical resolution across (s) and along (t), texels per pixel of \
+        "for each angle, depth ratio and warp: the critical resolution across (s) and along (t), texels per pixel of \
          the image's side",
         table,
     )?);
     Ok(Figure {
         name: "ours-critical",
         title: "The critical resolution over the depth ratio".into(),
-        source: "Eqs. 9, 10 and 12 of Lloyd et al. 2006, for any angle of light",
+        source: "Lloyd, Tuft, Yoon and Manocha 2006, Eqs. 9, 10 and 12, for any angle of light",
         text: "The critical resolution is the smallest with which no texel shows larger than a pixel anywhere in the view; the charts \
                have its product over both directions, in texels per pixel of the image. Under \
                light overhead an even map needs texels with the square of the depth ratio f/n, a perspective warp \
@@ -292,7 +293,7 @@ pub(super) fn gain() -> Result<Figure> {
     Ok(Figure {
         name: "ours-gain",
         title: "What adapting the warp to the light's angle gains".into(),
-        source: "the direction-adaptive warp that Zhang, Zhao and Sun 2009 name as future work",
+        source: "Zhang, Zhao and Sun 2009, conclusion: the direction-adaptive warp that they name as future work",
         text: "How many times the texels LiSPSM needs that the adaptive warp needs for the same guaranteed error. \
                Overhead (θ = 90°) the two are the same. It grows as light and view close in on each other, towards θ = φ the more the deeper the view: \
                LiSPSM's rule is derived for light overhead and carried over by 1/sin θ, which weakens the \
@@ -303,7 +304,7 @@ pub(super) fn gain() -> Result<Figure> {
         files: vec![
             File::svg("lines", "Gain over θ for four depth ratios", lines.svg()?),
             File::svg("map", "Gain over θ and f/n as colours", map.svg()?),
-            File::csv("", "For each rule of LiSPSM, depth ratio and whole degree: the gain", table)?,
+            File::csv("", "for each rule of LiSPSM, depth ratio and whole degree: the gain", table)?,
         ],
     })
 }
