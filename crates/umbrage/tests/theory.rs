@@ -226,11 +226,11 @@ impl Measured {
         z * self.sin - y * self.cos - self.nearest + self.lambda
     }
 
-    /// Across and along the map.
+    /// Across and along the map, less 1/2 and (λ + μ)/μ: constants that would cost differences their digits.
     fn map(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let z_w = self.z_w(y, z);
-        let along = (self.lambda + self.mu) / self.mu * (1.0 - self.lambda / z_w);
-        [x / (2.0 * z_w * self.tan_phi_w) + 0.5, along]
+        let along = -(self.lambda + self.mu) / self.mu * (self.lambda / z_w);
+        [x / (2.0 * z_w * self.tan_phi_w), along]
     }
 
     /// (q, p).
@@ -248,7 +248,7 @@ proptest! {
     fn errors_are_the_derivatives_of_the_map(
         view in views(),
         theta in 0.0..=PI,
-        strength in -3.0..4.0f64,
+        strength in -2.0..4.0f64,
         [x, y, z] in [-1.0..1.0f64, -1.0..1.0, 0.0..1.0],
         slope in [-2.0..2.0f64, -2.0..2.0],
     ) {
@@ -276,7 +276,7 @@ proptest! {
             [0, 1].map(|i| (a[i] - b[i]) / (2.0 * step))
         };
         let extrapolated = |of: &dyn Fn([f64; 3]) -> [f64; 2]| {
-            let step = 1e-3 * z.min(found);
+            let step = 1e-2 * z.min(found);
             let [coarse, fine] = [derivative(step, of), derivative(step / 2.0, of)];
             [0, 1].map(|i| (4.0 * fine[i] - coarse[i]) / 3.0)
         };
@@ -324,7 +324,7 @@ proptest! {
     /// W&P Eqs. 7, 8 against their parameterization (Eqs. 5, 6), differentiated numerically, and against its
     /// printed pieces 10 and 12 in the papers' range of λ.
     #[test]
-    fn overhead_errors_are_the_derivatives_of_the_map(view in views(), z in 0.0..1.0f64, eta in -0.999..1.0f64) {
+    fn overhead_errors_are_the_derivatives_of_the_map(view in views(), z in 0.0..1.0f64, eta in -0.98..1.0f64) {
         let (n, f, k) = (view.near(), view.far(), view.tan_phi());
         let lambda = view.lambda_from_eta(eta).unwrap();
         let overhead = Overhead::new(view, lambda).unwrap();
@@ -334,7 +334,7 @@ proptest! {
         let t = |z: f64| f_w / (f_w - lambda) * (1.0 - lambda / z_w(z));
         let s = |x: f64| x / (2.0 * z_w(z) * (f / f_w) * k);
         let pixel = 2.0 * z * k;
-        let step = 1e-4 * z;
+        let step = 3e-4 * z;
         let (dx_ds, dz_dt) = (2.0 * step / (s(step) - s(-step)), 2.0 * step / (t(z + step) - t(z - step)));
         prop_assert!((overhead.m_s(z).unwrap() * pixel / dx_ds - 1.0).abs() < 1e-6);
         prop_assert!((overhead.m_t(z).unwrap() * pixel / dz_dt - 1.0).abs() < 1e-6);
@@ -471,7 +471,7 @@ proptest! {
         let w = Measured::new(view, theta, lambda);
         let delta = w.z_w(0.0, focus) - lambda;
         if lambda.is_finite() {
-            let row = w.map([0.0, 0.0, focus])[1];
+            let row = w.map([0.0, 0.0, focus])[1] + (lambda + w.mu) / w.mu;
             prop_assert!((row - 0.8).abs() < 1e-6, "{row}");
         } else {
             let delta = if delta.is_nan() { Measured::new(view, theta, 1.0).z_w(0.0, focus) - 1.0 } else { delta };
@@ -843,10 +843,16 @@ fn what_makes_no_sense_is_refused_by_name() {
     let point = [0.0, 0.0, 5.0];
     let nan_x = warped.projection([f64::NAN, 0.0, 5.0], [0.0; 2]);
     assert_eq!(field(nan_x.map(drop)), "theory.point");
-    for slope in [[f64::NAN, 0.0], [0.0, f64::INFINITY], [0.0, 0.0]] {
-        // On the axis, dx/dz = 0 runs along the line of sight and along the map's column.
+    for slope in [[f64::NAN, 0.0], [0.0, f64::INFINITY]] {
         assert_eq!(field(warped.projection(point, slope).map(drop)), "theory.slope", "{slope:?}");
     }
+    // On the axis and along it neither image nor map move sideways, but E_q has a limit. Beside it the map
+    // alone stands still.
+    let unwarped = Tilted::new(view, 0.0).unwrap().warped(f64::INFINITY).unwrap();
+    assert_eq!(unwarped.projection(point, [0.0, 0.5]).unwrap().q, 1.0);
+    assert_eq!(unwarped.projection([1.0, 0.0, 5.0], [0.0, 0.5]).unwrap().q, f64::INFINITY);
+    let along_both = unwarped.projection([0.0, 0.0, 5.0], [0.0, 0.0]);
+    assert_eq!(field(along_both.map(drop)), "theory.slope");
     // Along the light alone: no bound, but no nonsense either.
     let along_light = 1.0 / f64::tan(PI / 4.0);
     let edge_on = Tilted::new(view, PI / 4.0).unwrap().warped(2.0).unwrap();

@@ -252,7 +252,9 @@ impl Warped {
         let [k_x, k_y] = slope;
         // How fast z_w changes along the slope.
         let along_w = sin - cos * k_y;
-        let q = ((k_x - x / z) / (k_x - x / self.z_w(y, z) * along_w)).abs();
+        // On the plane of symmetry it is 1 for every k_x, so that it is for 0/0 too.
+        let q = if x == 0.0 { 1.0 } else { (k_x - x / z) / (k_x - x / self.z_w(y, z) * along_w) };
+        let q = q.abs();
         let p = ((k_y - y / z) / along_w).abs();
         let is_good = k_x.is_finite() && k_y.is_finite() && !q.is_nan() && !p.is_nan();
         check(is_good, "theory.slope", || {
