@@ -124,8 +124,8 @@ pub(super) fn theory_fig3() -> Result<Figure> {
                warp (SSM) both errors are worst at the tip and fall with distance. Warps even them out along the \
                view; TSM is the strongest here, so it draws the foreground best and the distance worst. As the light tilts, \
                the errors come to depend on height: small at V's upper side, large at its lower one, which is where \
-               ground is. At θ = 30°, as much as φ, the view's upper side lies along the light; LiSPSM hardly warps any more, TSM \
-               still does, and pays in V's lower half. All maxima of E_p · E_q are at the lower near or far corner; adaptive makes those of E_p \
+               ground is. At θ = 30°, as much as φ, the view's upper side lies along the light; LiSPSM \
+               warps less there, TSM more, and pays in V's lower half (as a technique to plan with it stops at λ = n/sin θ, 2 m). All maxima of E_p · E_q are at the lower near or far corner; adaptive makes those of E_p \
                equal there. It guards the worst point, wherever anybody looks, and so may do worse than no warp where the \
                detail is."
             .into(),
