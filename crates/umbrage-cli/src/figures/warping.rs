@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 use umbrage::theory::{LightFrom, Overhead, Rule, View, storage_factor};
 use umbrage::{Faces, Objective, Partition, Warp};
 
-/// Number formats of one λ in legends.
+/// A λ in a legend.
 fn lambda_name(view: View, lambda: f64) -> String {
     if lambda == f64::INFINITY {
         "∞ (no warp)".to_owned()
@@ -429,10 +429,11 @@ pub(super) fn fig12() -> Result<Figure> {
         name: "wp-fig12",
         title: "What a map more is worth".to_owned(),
         source: "Lloyd, Tuft, Yoon and Manocha 2006, Figure 12 (Eqs. 17 to 21)",
-        text: "Storage over the number of shadow maps, which is what rendering time goes by. Faces take four maps and \
-               one for the near face for every slice, and with the light overhead four of them see nothing: there \
-               slices alone are better. With the light behind nothing can be warped but faces. Slices alone soon overlap so much \
-               that more of them cost more again, least at 14 maps; faces go on falling."
+        text: "Storage over the number of shadow maps, which is what rendering time goes by. Faces take four maps for \
+               every slice and one for the near face. With the light overhead it meets one side only, all other \
+               maps are empty, and slices alone are better. With the light behind, faces are all that can be warped, \
+               so that slices need as much with a warp as without; and they soon overlap so much that more of \
+               them cost more again, least at 14 maps, while faces go on falling."
             .to_owned(),
         files: vec![
             File::svg("overhead", "Storage factor over the number of maps, light overhead", overhead),
