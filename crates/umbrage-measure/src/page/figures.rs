@@ -1,5 +1,6 @@
 //! The page of the papers' figures.
 
+use super::view::url;
 use crate::{Error, write_file};
 use askama::Template;
 use serde::Serialize;
@@ -80,4 +81,44 @@ pub fn write_figures(folder: impl AsRef<Path>, page: &FiguresPage<'_>) -> Result
     let json = serde_json::to_string_pretty(page.figures)? + "\n";
     write_file(folder.join("figures.json"), json.as_bytes())?;
     write_file(path, html.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_files_are_refused_and_leave_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |file: &str, rows: &[[&str; 2]]| FigureFile {
+            file: file.to_owned(),
+            about: "what <it> shows".to_owned(),
+            rows: rows.iter().map(|row| row.map(str::to_owned).to_vec()).collect(),
+        };
+        let figure = FigureShown {
+            name: "one".to_owned(),
+            title: "One & only".to_owned(),
+            source: "Somebody 2004".to_owned(),
+            text: "n < f".to_owned(),
+            files: vec![file("one a.svg", &[]), file("one.csv", &[["k", "m < 1"], ["7", "0.5"]])],
+        };
+        let write = || {
+            let page = FiguresPage { figures: std::slice::from_ref(&figure), command: "umbrage" };
+            write_figures(folder.path(), &page).map_err(|e| e.to_string())
+        };
+        write_file(folder.path().join("one a.svg"), b"<svg/>").unwrap();
+        assert!(write().unwrap_err().starts_with("figures: one.csv is not in "));
+        assert!(!folder.path().join("figures.json").exists());
+        write_file(folder.path().join("one.csv"), b"").unwrap();
+        write().unwrap();
+        let page = std::fs::read_to_string(folder.path().join("index.html")).unwrap();
+        for part in
+            ["One &#38; only", "n &#60; f", "src=\"one%20a.svg\"", "m &#60; 1", "<td>0.5</td>"]
+        {
+            assert!(page.contains(part), "{part}: {page}");
+        }
+        let json = std::fs::read_to_string(folder.path().join("figures.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(json[0]["files"][0]["file"], "one a.svg");
+    }
 }
