@@ -38,7 +38,7 @@ fn shared_options() {
     let desk = desk();
     for (options, expected) in [
         (&["--eye", "1,2"][..], "--eye"),
-        (&["--eye", "1,2"], "three numbers"),
+        (&["--eye", "1,2"], "three finite numbers"),
         (&["--eye", "1,2,NaN"], "three finite numbers"),
         (&["--eye", "0,0,1e300"], "within 1e12"),
         (&["--eye"], "--eye"),
@@ -65,7 +65,7 @@ fn shared_options() {
         (&["--camera", "front", "--eye", "0,0,0"], "cannot be used with"),
         (&["--sun", "0,0,0"], "--sun"),
         (&["--sun", "0,0,0"], "must point somewhere"),
-        (&["--sun", "down"], "three numbers"),
+        (&["--sun", "down"], "three finite numbers"),
         (&["--light", "moon"], "--light: the scene has no light `moon`"),
         (&["--light", "moon", "--sun", "0,-1,0"], "cannot be used with"),
         (&["--shadows", ""], "--shadows"),

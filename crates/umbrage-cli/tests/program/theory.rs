@@ -232,7 +232,7 @@ fn what_makes_no_sense_is_refused() {
             "--point: must lie before the eye",
         ),
         (format!("aliasing {VIEW} --theta 45 --lambda 1 --point 0,90,20"), "centre of projection"),
-        (format!("aliasing {VIEW} --theta 60 --lambda 1 --point 0,0"), "three numbers"),
+        (format!("aliasing {VIEW} --theta 60 --lambda 1 --point 0,0"), "three finite numbers"),
         (format!("aliasing {VIEW} {point} --slope 1"), "two numbers"),
         (format!("aliasing {VIEW} {point} --slope nan,1"), "--slope"),
         (
