@@ -58,6 +58,8 @@ pub enum Warp {
     /// Light space perspective shadow maps (Wimmer et al. 2004): λ = (n + √(n f))/sin θ, with f drawn
     /// in to n + μ sin θ where the tilt shrinks the warp's range (§4.4). n and f are the nearest and
     /// farthest view distance of the receivers seen.
+    /// Under light within about φ of the view it can need several times the texels of `Uniform` for the same
+    /// largest error.
     Lispsm,
     /// Trapezoidal shadow maps (Martin and Tan 2004, as Lloyd et al. 2006 describe them): what is
     /// nearer than the focus distance gets 80% of the rows. Never stronger than λ = n/sin θ.
