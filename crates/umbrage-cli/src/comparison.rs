@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::motion::{Motion, Scenery, flicker};
-use crate::pixels::{self, Shadowed, Texels, casters_culled, counted, milliseconds};
+use crate::pixels::{self, Shadowed, Texels, casters, casters_culled, counted, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker};
 use crate::spec::Technique;
@@ -286,7 +286,7 @@ impl Contender<'_> {
             metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
             error_px: measure_error_px(&error_px, truth.counted)?,
             storage_factor: Some(self.plan.storage_factor()),
-            casters_culled: casters_culled(self.plan, scene),
+            casters_culled: casters_culled(self.plan, &casters(self.plan, scene)),
             flicker: self.flicker,
             ms: self.ms,
         };

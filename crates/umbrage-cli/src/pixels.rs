@@ -184,8 +184,8 @@ pub(crate) fn casters(plan: &Plan, scene: &Scene) -> Vec<Casters> {
 }
 
 /// Share of all triangles that are culled, the mean over maps that are not empty.
-pub(crate) fn casters_culled(plan: &Plan, scene: &Scene) -> Option<f64> {
-    let casters = plan.maps.iter().zip(casters(plan, scene));
+pub(crate) fn casters_culled(plan: &Plan, casters: &[Casters]) -> Option<f64> {
+    let casters = plan.maps.iter().zip(casters);
     let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);
     let [drawn, culled] =
         of_full.fold([0, 0], |[d, c], casters| [d + casters.drawn, c + casters.culled]);

@@ -1,6 +1,6 @@
 //! `umbrage plan`: the matrices, resolutions and errors that an engine needs.
 
-use crate::args;
+use crate::args::{self, Fit};
 use crate::output::print;
 use crate::pixels::{Casters, casters, casters_culled};
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
@@ -109,9 +109,10 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     if let Some(scene) = &scene {
         tell_notices(scene);
     }
-    let receivers = scene.as_ref().map(|scene| {
-        let tracer = Tracer::new(scene)?;
-        Ok::<_, Error>(Receivers::new(scene, &tracer, args.fit))
+    let receivers = scene.as_ref().map(|scene| match args.fit {
+        // Of all commands this one alone can do without rays.
+        Fit::Box => Ok(Receivers::in_box(scene)),
+        fit => Ok::<_, Error>(Receivers::new(scene, &Tracer::new(scene)?, fit)),
     });
     let receivers = receivers.transpose()?;
     let bounds = receivers.as_ref().map_or_else(Bounds::default, Receivers::bounds);
@@ -146,7 +147,7 @@ impl<'a> Planned<'a> {
             lay_out(plan, gutter, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
         });
         let casters = scene.map(|s| casters(plan, s));
-        let culled = scene.and_then(|s| casters_culled(plan, s));
+        let culled = casters.as_ref().and_then(|c| casters_culled(plan, c));
         Self { technique, onlooker, lamps, plan, atlas, layers, casters, culled }
     }
 

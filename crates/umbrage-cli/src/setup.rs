@@ -181,11 +181,15 @@ const SURFACE_BOXES: usize = 256;
 
 impl Receivers {
     pub(crate) fn new(scene: &Scene, tracer: &Tracer<'_>, fit: Fit) -> Self {
-        let parts = match fit {
-            Fit::Box => Vec::new(),
-            Fit::Surfaces => tracer.boxes(SURFACE_BOXES),
-        };
-        Self { all: scene.bounds(), parts }
+        match fit {
+            Fit::Box => Self::in_box(scene),
+            Fit::Surfaces => Self { parts: tracer.boxes(SURFACE_BOXES), ..Self::in_box(scene) },
+        }
+    }
+
+    /// Anywhere in the box around the scene.
+    pub(crate) fn in_box(scene: &Scene) -> Self {
+        Self { all: scene.bounds(), parts: Vec::new() }
     }
 
     pub(crate) fn bounds(&self) -> Bounds<'_> {
