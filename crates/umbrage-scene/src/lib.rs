@@ -5,6 +5,7 @@
 //! their own space, and drawn by [`Instance`]s with double-precision transforms.
 
 mod builtin;
+pub mod daylight;
 mod error;
 mod load;
 mod texture;

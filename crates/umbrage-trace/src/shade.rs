@@ -3,19 +3,7 @@
 use crate::{Band, Sample, View};
 use glam::{DVec2, DVec3, Vec3};
 use umbrage::{Camera, Light};
-
-/// Light of the sun or lamp on a surface that faces it. Linear, in units of display white, as all
-/// colours here; chosen so that white paper in the sun is just below display white, and its shadow
-/// clearly darker and bluish.
-const SUN: Vec3 = Vec3::new(1.42, 1.33, 1.18);
-/// Light of the sky on a surface that faces up, and of the ground on one that faces down.
-const SKY_LIGHT: Vec3 = Vec3::new(0.25, 0.31, 0.41);
-const GROUND_LIGHT: Vec3 = Vec3::new(0.15, 0.135, 0.12);
-const ZENITH: Vec3 = Vec3::new(0.16, 0.33, 0.68);
-const HORIZON: Vec3 = Vec3::new(0.72, 0.80, 0.88);
-/// The sky below the horizon, where no ground is in the way.
-const NADIR: Vec3 = Vec3::new(0.34, 0.34, 0.34);
-const GLOW: Vec3 = Vec3::new(0.30, 0.24, 0.14);
+use umbrage_scene::daylight::{GLOW, GROUND_LIGHT, HORIZON, NADIR, SKY_LIGHT, SUN, ZENITH};
 
 /// The picture of a band, one sRGB colour a pixel. `visibility` has one value a sample, as
 /// [`Band::map`] makes it with [`View::truth`] or [`Reference::visibility`](crate::Reference::visibility).

@@ -1,4 +1,4 @@
-use crate::plan::{Plan, ShadowMap};
+use crate::plan::Plan;
 use glam::DVec2;
 use guillotiere::{AllocatorOptions, DEFAULT_OPTIONS, SimpleAtlasAllocator, size2};
 
@@ -63,15 +63,25 @@ impl Atlas {
     /// Where no arrangement is found. Over plans of the built-in scenes with 4 to 102 maps, maps and
     /// gutters filled 93% of the atlas in the mean, 85% at worst.
     pub fn packed(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(plan, gutter_texels, max_side)?;
+        Self::packed_sizes(&resolutions(plan), gutter_texels, max_side)
+    }
+
+    /// As [`packed`](Self::packed), for rectangles of any sizes (texels in s and t): those of a plan's maps with
+    /// room to grow, say. One without texels has no place.
+    ///
+    /// # Errors
+    /// Where no arrangement is found.
+    pub fn packed_sizes(
+        sizes: &[[u32; 2]],
+        gutter_texels: u32,
+        max_side: u32,
+    ) -> Result<Self, AtlasTooLarge> {
+        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
         let packing = boxes.pack().ok_or(boxes.too_large)?;
-        let mut places = vec![None; plan.maps.len()];
+        let mut places = vec![None; sizes.len()];
         for (&(map, _), corner) in boxes.list.iter().zip(packing.corners) {
-            places[map] = Some(Place {
-                layer: 0,
-                origin: corner.map(|c| c + gutter_texels),
-                size: plan.maps[map].resolution,
-            });
+            let origin = corner.map(|c| c + gutter_texels);
+            places[map] = Some(Place { layer: 0, origin, size: sizes[map] });
         }
         Ok(Self { size: packing.size, layers: 1, gutter_texels, places })
     }
@@ -81,17 +91,26 @@ impl Atlas {
     ///
     /// Parameters and errors are those of [`packed`](Self::packed).
     pub fn layered(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(plan, gutter_texels, max_side)?;
-        let places = plan.maps.iter().zip(0..).map(|(map, layer)| {
-            (!map.is_empty()).then_some(Place {
-                layer,
-                origin: [gutter_texels; 2],
-                size: map.resolution,
-            })
+        Self::layered_sizes(&resolutions(plan), gutter_texels, max_side)
+    }
+
+    /// As [`layered`](Self::layered), for rectangles of any sizes (texels in s and t).
+    ///
+    /// # Errors
+    /// One that does not fit.
+    pub fn layered_sizes(
+        sizes: &[[u32; 2]],
+        gutter_texels: u32,
+        max_side: u32,
+    ) -> Result<Self, AtlasTooLarge> {
+        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
+        let places = sizes.iter().zip(0..).map(|(&size, layer)| {
+            let is_there = !size.contains(&0);
+            is_there.then_some(Place { layer, origin: [gutter_texels; 2], size })
         });
         Ok(Self {
             size: boxes.largest(),
-            layers: plan.maps.len() as u32,
+            layers: sizes.len() as u32,
             gutter_texels,
             places: places.collect(),
         })
@@ -121,6 +140,11 @@ impl ScaleOffset {
     }
 }
 
+/// Texels of a plan's maps.
+fn resolutions(plan: &Plan) -> Vec<[u32; 2]> {
+    plan.maps.iter().map(|m| m.resolution).collect()
+}
+
 /// Rectangles to be packed.
 struct Boxes {
     /// Index of the map, and its size with gutters.
@@ -148,11 +172,14 @@ impl Packing {
 
 impl Boxes {
     /// The maps with their gutters, if each of them fits.
-    fn new(plan: &Plan, gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
-        let with_gutters = |map: &ShadowMap| {
-            map.resolution.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)))
-        };
-        let full = || plan.maps.iter().enumerate().filter(|(_, m)| !m.is_empty());
+    fn new(
+        sizes: &[[u32; 2]],
+        gutter_texels: u32,
+        max_side: u32,
+    ) -> Result<Self, AtlasTooLarge> {
+        let with_gutters =
+            |size: [u32; 2]| size.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)));
+        let full = || sizes.iter().copied().enumerate().filter(|(_, size)| !size.contains(&0));
         let texels = full().map(|(_, m)| with_gutters(m).into_iter().fold(1, u64::saturating_mul));
         let too_large = AtlasTooLarge {
             maps: full().count(),

@@ -1,0 +1,529 @@
+use crate::scene::{Attributes, SceneBuffers};
+use crate::timer::Timer;
+use crate::view::{Tile, ViewUniform};
+use crate::{Error, Gpu};
+use glam::{DVec3, Vec3};
+use std::mem::{offset_of, size_of};
+use std::ops::Range;
+use umbrage::{Camera, Light, Plan, ShadowMap};
+use umbrage_wgpu::{
+    CasterInstance, Casters, DEPTH_FORMAT, Frame, Mask, MeshCasters, MeshKind, ShadowOptions,
+    Shadows, Support,
+};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
+    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
+    IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
+    PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
+    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
+    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
+    VertexState, VertexStepMode,
+};
+
+/// Draws one scene with one kind of shadow maps.
+pub struct Renderer<'g, 's> {
+    pub(crate) gpu: &'g Gpu,
+    scene: &'g SceneBuffers<'s>,
+    shadows: Shadows,
+    opaque: MeshCasters,
+    masked: MeshCasters,
+    /// One a material; `None` for opaque ones.
+    masks: Vec<Option<BindGroup>>,
+    view_buffer: Buffer,
+    view_group: BindGroup,
+    shader: ShaderModule,
+    layout: PipelineLayout,
+    frame: [RenderPipeline; 2],
+    instances: Instances,
+    eye: DVec3,
+}
+
+/// Who looks on, in which light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look<'a> {
+    /// The viewer that the maps were planned for.
+    pub camera: &'a Camera,
+    /// One of the plan's lights.
+    pub light: &'a Light,
+    /// Its index in the plan.
+    pub light_index: u32,
+}
+
+/// What was drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Maps; for pictures 0.
+    pub maps: usize,
+    /// Draw calls.
+    pub draws: u32,
+    /// Triangles, each instance's counted.
+    pub triangles: u64,
+}
+
+/// Instances to draw, list after list.
+struct Instances {
+    list: Vec<CasterInstance>,
+    draws: Vec<Draw>,
+    buffer: Buffer,
+}
+
+/// Some instances of one mesh.
+#[derive(Clone, Debug)]
+struct Draw {
+    mesh: usize,
+    instances: Range<u32>,
+}
+
+/// A range of draws, one a map or for a picture.
+type DrawList = Range<usize>;
+
+impl Instances {
+    fn clear(&mut self) {
+        self.list.clear();
+        self.draws.clear();
+    }
+
+    /// Adds all instances that `is_drawn` says, those of one mesh in one draw.
+    fn add(
+        &mut self,
+        scene: &SceneBuffers<'_>,
+        eye: DVec3,
+        is_drawn: impl Fn(usize) -> bool,
+    ) -> DrawList {
+        let first_draw = self.draws.len();
+        for &i in scene.by_mesh.iter().filter(|&&i| is_drawn(i)) {
+            let instance = &scene.scene().instances[i];
+            let index = self.list.len() as u32;
+            self.list.push(CasterInstance::new(&instance.world_from_mesh, eye));
+            match self.draws[first_draw..].last_mut() {
+                Some(draw) if draw.mesh == instance.mesh => draw.instances.end = index + 1,
+                _ => self.draws.push(Draw { mesh: instance.mesh, instances: index..index + 1 }),
+            }
+        }
+        first_draw..self.draws.len()
+    }
+
+    fn upload(&mut self, gpu: &Gpu) -> Result<(), Error> {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.list);
+        if self.buffer.size() < bytes.len() as u64 {
+            let max = gpu.device().limits().max_buffer_size;
+            if bytes.len() as u64 > max {
+                return Err(Error::TooLarge {
+                    what: format!("the scene's {} instances, in all maps together,", self.list.len()),
+                    problem: format!("a buffer takes {max} bytes"),
+                });
+            }
+            self.buffer = instance_buffer(gpu, (bytes.len() as u64).next_power_of_two().min(max));
+        }
+        gpu.queue().write_buffer(&self.buffer, 0, bytes);
+        Ok(())
+    }
+}
+
+fn instance_buffer(gpu: &Gpu, size: u64) -> Buffer {
+    gpu.device().create_buffer(&BufferDescriptor {
+        label: Some("instances"),
+        size,
+        usage: BufferUsages::VERTEX | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
+    array_stride: size_of::<Vec3>() as u64,
+    step_mode: VertexStepMode::Vertex,
+    attributes: &[VertexAttribute {
+        format: VertexFormat::Float32x3,
+        offset: 0,
+        shader_location: 0,
+    }],
+};
+
+const ATTRIBUTES: VertexBufferLayout<'static> = VertexBufferLayout {
+    array_stride: size_of::<Attributes>() as u64,
+    step_mode: VertexStepMode::Vertex,
+    attributes: &[
+        VertexAttribute {
+            format: VertexFormat::Float32x2,
+            offset: offset_of!(Attributes, uv) as u64,
+            shader_location: 4,
+        },
+        VertexAttribute {
+            format: VertexFormat::Float32x3,
+            offset: offset_of!(Attributes, normal) as u64,
+            shader_location: 5,
+        },
+    ],
+};
+
+impl<'g, 's> Renderer<'g, 's> {
+    /// A renderer whose shadow maps are looked up as `options` say.
+    ///
+    /// # Errors
+    /// A device that cannot do so.
+    pub fn new(
+        gpu: &'g Gpu,
+        scene: &'g SceneBuffers<'s>,
+        options: &ShadowOptions,
+    ) -> Result<Self, Error> {
+        Self::with_support(gpu, scene, options, gpu.support())
+    }
+
+    /// The same on a device that is said to do less than it can.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_support(
+        gpu: &'g Gpu,
+        scene: &'g SceneBuffers<'s>,
+        options: &ShadowOptions,
+        support: Support,
+    ) -> Result<Self, Error> {
+        let device = gpu.device();
+        let shadows = Shadows::new(device, support, options)?;
+        let [positions, instances] = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
+        let opaque = MeshCasters::new(
+            device,
+            &shadows,
+            MeshKind::Opaque,
+            &[positions.clone(), instances.clone()],
+        );
+        let masked = MeshCasters::new(
+            device,
+            &shadows,
+            MeshKind::Masked,
+            &[positions, instances, Some(ATTRIBUTES)],
+        );
+        let masks = scene.materials.iter().map(|m| {
+            let mask = m.mask.as_ref()?;
+            masked.mask(
+                device,
+                &Mask {
+                    texture: &mask.texture,
+                    sampler: &mask.sampler,
+                    factor: mask.factor,
+                    cutoff: mask.cutoff,
+                },
+            )
+        });
+        let masks = masks.collect();
+        let view_buffer = device.create_buffer(&BufferDescriptor {
+            label: Some("view"),
+            size: size_of::<ViewUniform>() as u64,
+            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let view_layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+            label: Some("view"),
+            entries: &[BindGroupLayoutEntry {
+                binding: 0,
+                visibility: ShaderStages::VERTEX_FRAGMENT,
+                ty: BindingType::Buffer {
+                    ty: BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            }],
+        });
+        let view_group = device.create_bind_group(&BindGroupDescriptor {
+            label: Some("view"),
+            layout: &view_layout,
+            entries: &[BindGroupEntry { binding: 0, resource: view_buffer.as_entire_binding() }],
+        });
+        let shader = device.create_shader_module(ShaderModuleDescriptor {
+            label: Some("forward"),
+            source: ShaderSource::Wgsl(shader_text(&shadows).into()),
+        });
+        let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: Some("forward"),
+            bind_group_layouts: &[
+                Some(&view_layout),
+                Some(shadows.lookup_layout()),
+                Some(&scene.material_layout),
+            ],
+            immediate_size: 0,
+        });
+        let frame = pipelines(gpu, &shader, &layout, "frame", &[FRAME_FORMAT]);
+        let instances =
+            Instances { list: Vec::new(), draws: Vec::new(), buffer: instance_buffer(gpu, 4096) };
+        gpu.check()?;
+        Ok(Self {
+            gpu,
+            scene,
+            shadows,
+            opaque,
+            masked,
+            masks,
+            view_buffer,
+            view_group,
+            shader,
+            layout,
+            frame,
+            instances,
+            eye: DVec3::ZERO,
+        })
+    }
+
+    /// The maps.
+    pub fn shadows(&self) -> &Shadows {
+        &self.shadows
+    }
+
+    /// Draws those of the plan's maps that are not as they should be, and waits for nothing.
+    ///
+    /// # Errors
+    /// Maps that this device cannot hold or draw.
+    pub fn draw_maps(
+        &mut self,
+        plan: &Plan,
+        casters: Casters<'_>,
+        timer: Option<&Timer>,
+    ) -> Result<Drawn, Error> {
+        let Self { gpu, scene, shadows, instances, .. } = self;
+        let frame = Frame { plan, render_origin: plan.origin, casters };
+        let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
+        self.eye = plan.origin;
+        instances.clear();
+        let casts = |map: &ShadowMap, i: usize| map.may_cast(scene.boxes[i]);
+        let lists: Vec<(usize, DrawList)> = prepared
+            .stale()
+            .map(|map| {
+                let list = instances.add(scene, plan.origin, |i| casts(&plan.maps[map], i));
+                (map, list)
+            })
+            .collect();
+        let mut drawn = Drawn::default();
+        if lists.is_empty() {
+            return Ok(drawn);
+        }
+        instances.upload(gpu)?;
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let pipelines = CasterPipelines { opaque: &self.opaque, masked: &self.masked };
+        let masks = &self.masks;
+        drawn.maps = prepared.encode(&mut encoder, timer.map(Timer::depth_pass), |map| {
+            let list = lists.iter().find(|(index, _)| *index == map.index);
+            let draws = list.map_or(&[][..], |(_, list)| &instances.draws[list.clone()]);
+            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, &mut drawn);
+            for draw in draws {
+                let material = scene.meshes[draw.mesh].material;
+                let mask = masks[material].as_ref();
+                drawer.choose(usize::from(mask.is_some()), |pass| pipelines.set(pass, mask.is_some()));
+                if let Some(mask) = mask {
+                    drawer.pass.set_bind_group(1, mask, &[]);
+                }
+                drawer.draw(draw);
+            }
+        });
+        gpu.queue().submit([encoder.finish()]);
+        gpu.check()?;
+        Ok(drawn)
+    }
+
+    /// Draws a frame to look at into a target of [`FRAME_FORMAT`] as large as the camera's picture, and a depth target of
+    /// [`DEPTH_FORMAT`]. The maps must be drawn.
+    ///
+    /// # Errors
+    /// What the device refuses.
+    pub fn frame(
+        &mut self,
+        look: &Look<'_>,
+        color: &TextureView,
+        depth: &TextureView,
+        timer: Option<&Timer>,
+    ) -> Result<Drawn, Error> {
+        let tile = Tile::whole(look.camera);
+        let pipelines = self.frame.clone();
+        let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
+        let target = Target { color: &[color], depth, pipelines: &pipelines };
+        let drawn = self.encode_picture(&mut encoder, look, &tile, &target, timer)?;
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
+        self.gpu.queue().submit([encoder.finish()]);
+        self.gpu.check()?;
+        Ok(drawn)
+    }
+
+    /// Pipelines whose fragment shaders are `mesh_NAME` and `sky_NAME`.
+    pub(crate) fn pipelines(&self, name: &str, formats: &[TextureFormat]) -> [RenderPipeline; 2] {
+        pipelines(self.gpu, &self.shader, &self.layout, name, formats)
+    }
+
+    /// Draws the scene and the sky. One picture a submission, as they share buffers.
+    pub(crate) fn encode_picture(
+        &mut self,
+        encoder: &mut CommandEncoder,
+        look: &Look<'_>,
+        tile: &Tile,
+        target: &Target<'_>,
+        timer: Option<&Timer>,
+    ) -> Result<Drawn, Error> {
+        let Self { gpu, scene, instances, .. } = self;
+        let Look { camera, light, light_index } = *look;
+        debug_assert!(self.eye == DVec3::ZERO || self.eye == camera.eye(), "render space is the eye's");
+        let view = ViewUniform::new(camera, light, light_index, tile);
+        gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
+        let planes = tile.planes(camera);
+        instances.clear();
+        let list = instances.add(scene, camera.eye(), |i| {
+            planes.iter().all(|p| p.may_touch(scene.boxes[i])) && !scene.boxes[i].is_empty()
+        });
+        instances.upload(gpu)?;
+        let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &attachments,
+            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+                view: target.depth,
+                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: timer.map(Timer::shade_pass),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_bind_group(0, &self.view_group, &[]);
+        pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
+        let mut drawn = Drawn::default();
+        let [mesh_pipeline, sky_pipeline] = target.pipelines;
+        let mut drawer = Drawer::new(scene, instances, &mut pass, &mut drawn);
+        for draw in &instances.draws[list] {
+            let material = scene.meshes[draw.mesh].material;
+            drawer.choose(0, |pass| pass.set_pipeline(mesh_pipeline));
+            drawer.pass.set_bind_group(2, &scene.materials[material].bind_group, &[]);
+            drawer.draw(draw);
+        }
+        pass.set_pipeline(sky_pipeline);
+        if let Some(any) = scene.materials.first() {
+            pass.set_bind_group(2, &any.bind_group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+        drop(pass);
+        Ok(drawn)
+    }
+}
+
+/// Format of frames to look at.
+pub const FRAME_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+
+/// Where a picture goes, and how.
+pub(crate) struct Target<'a> {
+    pub(crate) color: &'a [&'a TextureView],
+    pub(crate) depth: &'a TextureView,
+    /// For meshes and for the sky.
+    pub(crate) pipelines: &'a [RenderPipeline; 2],
+}
+
+struct CasterPipelines<'a> {
+    opaque: &'a MeshCasters,
+    masked: &'a MeshCasters,
+}
+
+impl CasterPipelines<'_> {
+    fn set(&self, pass: &mut RenderPass<'_>, is_masked: bool) {
+        let casters = if is_masked { self.masked } else { self.opaque };
+        pass.set_pipeline(casters.pipeline());
+    }
+}
+
+/// Draws meshes into a pass, with vertex buffers set once.
+struct Drawer<'a, 'p, 'e> {
+    scene: &'a SceneBuffers<'a>,
+    pass: &'p mut RenderPass<'e>,
+    drawn: &'p mut Drawn,
+    chosen: Option<usize>,
+}
+
+impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
+    fn new(
+        scene: &'a SceneBuffers<'a>,
+        instances: &Instances,
+        pass: &'p mut RenderPass<'e>,
+        drawn: &'p mut Drawn,
+    ) -> Self {
+        pass.set_vertex_buffer(0, scene.positions.slice(..));
+        pass.set_vertex_buffer(1, instances.buffer.slice(..));
+        pass.set_vertex_buffer(2, scene.attributes.slice(..));
+        pass.set_index_buffer(scene.indices.slice(..), IndexFormat::Uint32);
+        Self { scene, pass, drawn, chosen: None }
+    }
+
+    /// Sets a pipeline where another was used last.
+    fn choose(&mut self, which: usize, set: impl FnOnce(&mut RenderPass<'_>)) {
+        if self.chosen != Some(which) {
+            set(self.pass);
+            self.chosen = Some(which);
+        }
+    }
+
+    fn draw(&mut self, draw: &Draw) {
+        let mesh = &self.scene.meshes[draw.mesh];
+        self.pass.draw_indexed(mesh.indices.clone(), mesh.first_vertex, draw.instances.clone());
+        self.drawn.draws += 1;
+        self.drawn.triangles += mesh.indices.len() as u64 / 3 * draw.instances.len() as u64;
+    }
+}
+
+/// The forward shader, behind the lookup module that it calls.
+fn shader_text(shadows: &Shadows) -> String {
+    shadows.lookup_wgsl(1) + "\n" + include_str!("wgsl/forward.wgsl")
+}
+
+fn pipelines(
+    gpu: &Gpu,
+    module: &ShaderModule,
+    layout: &PipelineLayout,
+    name: &str,
+    formats: &[TextureFormat],
+) -> [RenderPipeline; 2] {
+    let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
+    let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(ATTRIBUTES)];
+    let pipeline = |what: &str, buffers: &[Option<VertexBufferLayout<'_>>], compare| {
+        let [vertex, fragment] = [format!("{what}_vertex"), format!("{what}_{name}")];
+        gpu.device().create_render_pipeline(&RenderPipelineDescriptor {
+            label: Some(&fragment),
+            layout: Some(layout),
+            vertex: VertexState {
+                module,
+                entry_point: Some(&vertex),
+                compilation_options: PipelineCompilationOptions::default(),
+                buffers,
+            },
+            // Both sides of every surface show.
+            primitive: PrimitiveState::default(),
+            depth_stencil: Some(DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(compare),
+                stencil: wgpu::StencilState::default(),
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(FragmentState {
+                module,
+                entry_point: Some(&fragment),
+                compilation_options: PipelineCompilationOptions::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    };
+    // Depth is reversed.
+    [
+        pipeline("mesh", &buffers, CompareFunction::Greater),
+        pipeline("sky", &[], CompareFunction::GreaterEqual),
+    ]
+}
+
+fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+    Some(RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store },
+    })
+}

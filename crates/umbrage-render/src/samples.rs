@@ -1,0 +1,198 @@
+//! What a picture's samples show, read back to be measured.
+
+use crate::renderer::{Look, Renderer, Target};
+use crate::view::Tile;
+use crate::{Error, Gpu};
+use glam::{Vec2, Vec3, Vec4};
+use std::ops::Range;
+use umbrage_wgpu::DEPTH_FORMAT;
+use wgpu::{
+    Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Extent3d,
+    MapMode, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor,
+    TextureDimension, TextureFormat, TextureUsages, TextureViewDescriptor,
+};
+
+/// What the GPU says of a point of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Linear colour.
+    pub radiance: Vec3,
+    /// How much of the light reaches the surface by the shadow maps, 0 to 1; 0 where it faces away, 1 in the sky.
+    pub visibility: f32,
+    /// Whether a surface is seen that faces the light and is within its reach.
+    pub is_facing: bool,
+    /// Distance along the view, metres; infinite in the sky.
+    pub depth: f32,
+    /// Shading normal, world space; zero in the sky.
+    pub normal: Vec3,
+    /// Index in the plan of the map that serves the point.
+    pub map: Option<u32>,
+    /// Texel coordinates in that map; NaN without one.
+    pub texel: Vec2,
+    /// Pixels per texel on the surface, in the worst direction; NaN without a map.
+    pub error: f32,
+}
+
+const DATA: TextureFormat = TextureFormat::Rgba32Float;
+
+/// The longest side of a tile, samples: 32 MB each of three layers.
+const TILE: u32 = 1024;
+
+impl Renderer<'_, '_> {
+    /// All samples of some of a picture's rows, pixel by pixel from the left and row by row, `grid` × `grid` in each pixel
+    /// (row by row as well), on a regular grid. The maps must be drawn. `wants_texels`: texels, maps and errors are needed.
+    ///
+    /// # Errors
+    /// What the device refuses, or its loss.
+    pub fn samples(
+        &mut self,
+        look: &Look<'_>,
+        rows: Range<u32>,
+        grid: u32,
+        wants_texels: bool,
+    ) -> Result<Vec<Sample>, Error> {
+        let width = look.camera.image()[0] * grid;
+        let [first, end] = [rows.start * grid, rows.end * grid];
+        let nothing = Sample::new(Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, 0.0, -1.0, 0.0));
+        let mut samples = vec![nothing; (width as usize) * (end - first) as usize];
+        let side = TILE.min(self.gpu.device().limits().max_texture_dimension_2d);
+        let picture = self.pipelines("picture", &[DATA, DATA]);
+        let texels = wants_texels.then(|| self.pipelines("texels", &[DATA]));
+        let size = [side.min(width), side.min(end - first)];
+        let layers = Layers::new(self.gpu, size);
+        for top in (first..end).step_by(side as usize) {
+            for left in (0..width).step_by(side as usize) {
+                let size = [side.min(width - left), side.min(end - top)];
+                let tile = Tile { origin: [left, top], size, grid };
+                let data = layers.draw(self, look, &tile, &picture, texels.as_ref())?;
+                for (i, sample) in data.into_iter().enumerate() {
+                    let [x, y] = [i as u32 % size[0] + left, i as u32 / size[0] + top - first];
+                    let pixel = (y / grid) * (width / grid) + x / grid;
+                    let within = (y % grid) * grid + x % grid;
+                    samples[(pixel * grid * grid + within) as usize] = sample;
+                }
+            }
+        }
+        Ok(samples)
+    }
+}
+
+impl Sample {
+    fn new(radiance_visibility: Vec4, normal_depth: Vec4, texel: Vec4) -> Self {
+        let visibility = radiance_visibility.w;
+        let is_sky = normal_depth.w <= 0.0;
+        let map = (texel.z >= 0.0).then_some(texel.z as u32);
+        Self {
+            radiance: radiance_visibility.truncate(),
+            visibility: visibility.max(0.0),
+            is_facing: visibility >= 0.0 && !is_sky,
+            depth: if is_sky { f32::INFINITY } else { normal_depth.w },
+            normal: normal_depth.truncate(),
+            map,
+            texel: if map.is_some() { Vec2::new(texel.x, texel.y) } else { Vec2::NAN },
+            error: if map.is_some() { texel.w } else { f32::NAN },
+        }
+    }
+}
+
+/// Textures that a tile is drawn into, and a buffer that all are read back through.
+struct Layers {
+    color: [Texture; 2],
+    depth: Texture,
+    readback: Buffer,
+    bytes_per_row: u32,
+    bytes: u64,
+}
+
+impl Layers {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
+        let texture = |format| {
+            gpu.device().create_texture(&TextureDescriptor {
+                label: Some("samples"),
+                size: Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: TextureDimension::D2,
+                format,
+                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        let bytes_per_row = (16 * width).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(bytes_per_row) * u64::from(height);
+        let readback = gpu.device().create_buffer(&BufferDescriptor {
+            label: Some("samples"),
+            size: 3 * bytes,
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        Self {
+            color: [texture(DATA), texture(DATA)],
+            depth: texture(DEPTH_FORMAT),
+            readback,
+            bytes_per_row,
+            bytes,
+        }
+    }
+
+    fn draw(
+        &self,
+        renderer: &mut Renderer<'_, '_>,
+        look: &Look<'_>,
+        tile: &Tile,
+        picture: &[wgpu::RenderPipeline; 2],
+        texels: Option<&[wgpu::RenderPipeline; 2]>,
+    ) -> Result<Vec<Sample>, Error> {
+        let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
+        let [first, second, depth] = [&self.color[0], &self.color[1], &self.depth].map(view);
+        // A tile at the picture's edge is drawn into a corner of the textures.
+        let device = renderer.gpu.device();
+        let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let target = Target { color: &[&first, &second], depth: &depth, pipelines: picture };
+        renderer.encode_picture(&mut encoder, look, &full, &target, None)?;
+        self.copy(&mut encoder, 0, 0);
+        self.copy(&mut encoder, 1, 1);
+        if let Some(texels) = texels {
+            let target = Target { color: &[&first], depth: &depth, pipelines: texels };
+            renderer.encode_picture(&mut encoder, look, &full, &target, None)?;
+            self.copy(&mut encoder, 0, 2);
+        }
+        renderer.gpu.queue().submit([encoder.finish()]);
+        let data = self.read(renderer.gpu)?;
+        let layer = self.bytes as usize / size_of::<Vec4>();
+        let row = self.bytes_per_row as usize / size_of::<Vec4>();
+        let none = Vec4::new(0.0, 0.0, -1.0, 0.0);
+        let mut samples = Vec::with_capacity((tile.size[0] * tile.size[1]) as usize);
+        for y in 0..tile.size[1] as usize {
+            for i in (0..tile.size[0] as usize).map(|x| y * row + x) {
+                let texel = if texels.is_some() { data[2 * layer + i] } else { none };
+                samples.push(Sample::new(data[i], data[layer + i], texel));
+            }
+        }
+        Ok(samples)
+    }
+
+    /// Copies a texture into a third of the buffer.
+    fn copy(&self, encoder: &mut CommandEncoder, texture: usize, third: u64) {
+        let texture = &self.color[texture];
+        let layout = TexelCopyBufferLayout {
+            offset: third * self.bytes,
+            bytes_per_row: Some(self.bytes_per_row),
+            rows_per_image: None,
+        };
+        let buffer = TexelCopyBufferInfo { buffer: &self.readback, layout };
+        encoder.copy_texture_to_buffer(texture.as_image_copy(), buffer, texture.size());
+    }
+
+    fn read(&self, gpu: &Gpu) -> Result<Vec<Vec4>, Error> {
+        self.readback.map_async(MapMode::Read, .., |_| {});
+        gpu.wait()?;
+        let lost = |e: wgpu::MapRangeError| Error::Lost(e.to_string());
+        let bytes = self.readback.get_mapped_range(..).map_err(lost)?;
+        let data = bytemuck::pod_collect_to_vec(&bytes);
+        drop(bytes);
+        self.readback.unmap();
+        Ok(data)
+    }
+}

@@ -1,0 +1,90 @@
+//! How long stages take on the GPU, by timestamp queries.
+
+use crate::{Error, Gpu};
+use wgpu::{
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, MapMode, QuerySet,
+    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
+};
+
+/// A stage of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Casters into the maps.
+    Depth,
+    /// The scene, with lookups.
+    Shade,
+}
+
+/// Measures one frame at a time.
+pub struct Timer {
+    queries: QuerySet,
+    resolved: Buffer,
+    readback: Buffer,
+}
+
+const COUNT: u32 = 4;
+const BYTES: u64 = 8 * COUNT as u64;
+
+impl Timer {
+    /// `None` on devices without timestamps.
+    pub fn new(gpu: &Gpu) -> Option<Self> {
+        if !gpu.device().features().contains(Features::TIMESTAMP_QUERY) {
+            return None;
+        }
+        let buffer = |usage| {
+            gpu.device().create_buffer(&BufferDescriptor {
+                label: Some("timestamps"),
+                size: BYTES,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        Some(Self {
+            queries: gpu.device().create_query_set(&QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: QueryType::Timestamp,
+                count: COUNT,
+            }),
+            resolved: buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
+            readback: buffer(BufferUsages::COPY_DST | BufferUsages::MAP_READ),
+        })
+    }
+
+    fn writes(&self, first: u32) -> RenderPassTimestampWrites<'_> {
+        RenderPassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        }
+    }
+
+    pub(crate) fn depth_pass(&self) -> RenderPassTimestampWrites<'_> {
+        self.writes(0)
+    }
+
+    pub(crate) fn shade_pass(&self) -> RenderPassTimestampWrites<'_> {
+        self.writes(2)
+    }
+
+    pub(crate) fn resolve(&self, encoder: &mut CommandEncoder) {
+        encoder.resolve_query_set(&self.queries, 0..COUNT, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
+    }
+
+    /// Milliseconds of the last frame's stages, after waiting for it. A stage without a pass keeps the time of the last
+    /// frame that had one.
+    ///
+    /// # Errors
+    /// The device's loss.
+    pub fn read(&self, gpu: &Gpu) -> Result<[f64; 2], Error> {
+        self.readback.map_async(MapMode::Read, .., |_| {});
+        gpu.wait()?;
+        let range = self.readback.get_mapped_range(..).map_err(|e| Error::Lost(e.to_string()))?;
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&range);
+        drop(range);
+        self.readback.unmap();
+        let ms = f64::from(gpu.queue().get_timestamp_period()) * 1e-6;
+        let span = |i: usize| ticks[i + 1].saturating_sub(ticks[i]) as f64 * ms;
+        Ok([span(0), span(2)])
+    }
+}

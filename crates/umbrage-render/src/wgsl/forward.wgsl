@@ -1,0 +1,274 @@
+// A scene in the light of a sun or lamp and the sky. Render space is relative to the eye. Put before it: Umbrage's lookup
+// module in bind group 1.
+
+struct View {
+    clip_from_render: mat4x4f,
+    // The ray of unit depth through the point (x, y) of the target is ray + x ray_x + y ray_y.
+    ray: vec3f,
+    // Points of the target along each side of a pixel.
+    grid: f32,
+    ray_x: vec3f,
+    light_kind: u32,
+    ray_y: vec3f,
+    // Of a lamp, metres.
+    light_range: f32,
+    // Unit vectors: the view's way, and the light's.
+    forward: vec3f,
+    // Of a spot light's half angle.
+    light_cosine: f32,
+    light_direction: vec3f,
+    light_index: u32,
+    light_position: vec3f,
+    padding: f32,
+    sun: vec4f,
+    sky_light: vec4f,
+    ground_light: vec4f,
+    zenith: vec4f,
+    horizon: vec4f,
+    nadir: vec4f,
+    glow: vec4f,
+}
+
+const DIRECTIONAL: u32 = 0u;
+const SPOT: u32 = 1u;
+const POINT: u32 = 2u;
+
+@group(0) @binding(0) var<uniform> view: View;
+
+struct Material {
+    base_color: vec4f,
+    // Below this alpha there is no surface; 0 if it is opaque.
+    cutoff: f32,
+}
+
+@group(2) @binding(0) var<uniform> material: Material;
+@group(2) @binding(1) var material_texture: texture_2d<f32>;
+@group(2) @binding(2) var material_sampler: sampler;
+
+struct Vertex {
+    @location(0) position: vec3f,
+    @location(1) render_from_mesh_x: vec4f,
+    @location(2) render_from_mesh_y: vec4f,
+    @location(3) render_from_mesh_z: vec4f,
+    @location(4) uv: vec2f,
+    @location(5) normal: vec3f,
+}
+
+struct Fragment {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+}
+
+@vertex
+fn mesh_vertex(vertex: Vertex) -> Fragment {
+    let x = vertex.render_from_mesh_x;
+    let y = vertex.render_from_mesh_y;
+    let z = vertex.render_from_mesh_z;
+    let point = vec4f(vertex.position, 1.0);
+    let position = vec3f(dot(x, point), dot(y, point), dot(z, point));
+    // Normals go by the cofactors, whose sign does not matter: they are turned to the seen side.
+    let n = vertex.normal;
+    let normal = vec3f(
+        dot(cross(y.xyz, z.xyz), n),
+        dot(cross(z.xyz, x.xyz), n),
+        dot(cross(x.xyz, y.xyz), n),
+    );
+    let clip = view.clip_from_render * vec4f(position, 1.0);
+    return Fragment(clip, position, normalize_or_zero(normal), vertex.uv);
+}
+
+@vertex
+fn sky_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    let corner = vec2f(f32((index << 1u) & 2u), f32(index & 2u));
+    // Depth is reversed: 0 is infinitely far.
+    return vec4f(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+fn normalize_or_zero(v: vec3f) -> vec3f {
+    // Scaled first, as squares of small numbers vanish.
+    let largest = max(abs(v.x), max(abs(v.y), abs(v.z)));
+    if (largest <= 0.0) {
+        return vec3f(0.0);
+    }
+    return normalize(v / largest);
+}
+
+// A surface, as seen.
+struct Surface {
+    position: vec3f,
+    // Of the triangle, turned to the eye.
+    normal: vec3f,
+    shading_normal: vec3f,
+    color: vec3f,
+    is_facing: bool,
+    // Of the light that reaches it, by the shadow maps; 0 if it faces away.
+    visibility: f32,
+}
+
+fn surface(in: Fragment) -> Surface {
+    // Derivatives first, where all of a quad is still there.
+    var normal = normalize_or_zero(shadow_normal(in.position));
+    let texel = textureSampleLevel(material_texture, material_sampler, in.uv, 0.0);
+    let color = material.base_color * texel;
+    if (color.a < material.cutoff) {
+        discard;
+    }
+    normal = select(normal, -normal, dot(normal, in.position) > 0.0);
+    var shading_normal = normalize_or_zero(in.normal);
+    if (all(shading_normal == vec3f(0.0))) {
+        shading_normal = normal;
+    }
+    shading_normal = select(shading_normal, -shading_normal, dot(shading_normal, normal) < 0.0);
+    let is_facing = faces_light(in.position, normal);
+    var visibility = 0.0;
+    if (is_facing) {
+        visibility = shadow_visibility(view.light_index, in.position, normal);
+    }
+    return Surface(in.position, normal, shading_normal, color.rgb, is_facing, visibility);
+}
+
+fn to_light(position: vec3f) -> vec3f {
+    if (view.light_kind == DIRECTIONAL) {
+        return -view.light_direction;
+    }
+    return normalize_or_zero(view.light_position - position);
+}
+
+// Whether the light can reach a surface if nothing stands between.
+fn faces_light(position: vec3f, normal: vec3f) -> bool {
+    let light = to_light(position);
+    if (dot(normal, light) <= 0.0) {
+        return false;
+    }
+    let from_light = position - view.light_position;
+    if (view.light_kind == SPOT) {
+        let along = dot(view.light_direction, from_light);
+        return along <= view.light_range && -dot(view.light_direction, light) >= view.light_cosine;
+    }
+    return view.light_kind == DIRECTIONAL || length(from_light) <= view.light_range;
+}
+
+// A lamp's light fades to nothing at the end of its range (Karis 2013, without the inverse square).
+fn attenuation(position: vec3f) -> f32 {
+    let from_light = position - view.light_position;
+    if (view.light_kind == DIRECTIONAL) {
+        return 1.0;
+    }
+    var distance = length(from_light);
+    if (view.light_kind == SPOT) {
+        distance = dot(view.light_direction, from_light);
+    }
+    let relative = distance / view.light_range;
+    let squared = relative * relative;
+    let window = max(1.0 - squared * squared, 0.0);
+    return window * window;
+}
+
+// Linear colour: diffuse, in the light that reaches it, the sky's and the ground's.
+fn radiance(s: Surface) -> vec3f {
+    let light = to_light(s.position);
+    let incidence = max(dot(s.shading_normal, light), 0.0);
+    let direct = view.sun.rgb * (incidence * s.visibility * attenuation(s.position));
+    let side = dot(s.shading_normal, vec3f(light.x, 0.0, light.z));
+    let up = 0.5 + 0.5 * s.shading_normal.y;
+    let ambient = mix(view.ground_light.rgb, view.sky_light.rgb, up) * (1.0 + 0.3 * side);
+    return s.color * (direct + ambient);
+}
+
+fn sky(target_position: vec2f) -> vec3f {
+    let ray = view.ray + target_position.x * view.ray_x + target_position.y * view.ray_y;
+    let direction = normalize(ray);
+    let height = direction.y;
+    var color: vec3f;
+    if (height >= 0.0) {
+        color = mix(view.horizon.rgb, view.zenith.rgb, 1.0 - pow(1.0 - height, 3.0));
+    } else {
+        color = mix(view.horizon.rgb, view.nadir.rgb, 1.0 - pow(max(1.0 + height, 0.0), 12.0));
+    }
+    if (view.light_kind == DIRECTIONAL) {
+        color += view.glow.rgb * pow(max(-dot(view.light_direction, direction), 0.0), 6.0);
+    }
+    return color;
+}
+
+// Khronos's PBR Neutral tone mapper (Khronos Group 2024).
+fn compress(linear: vec3f) -> vec3f {
+    let start = 0.8 - 0.04;
+    let positive = max(linear, vec3f(0.0));
+    let low = min(positive.r, min(positive.g, positive.b));
+    let offset = select(0.04, low - 6.25 * low * low, low < 0.08);
+    let color = positive - offset;
+    let peak = max(color.r, max(color.g, color.b));
+    if (peak < start) {
+        return color;
+    }
+    let room = 1.0 - start;
+    let new_peak = 1.0 - room * room / (peak + room - start);
+    let gray = 1.0 - 1.0 / (0.15 * (peak - new_peak) + 1.0);
+    return mix(color * (new_peak / peak), vec3f(new_peak), gray);
+}
+
+// A frame to look at: the target's format encodes it.
+@fragment
+fn mesh_frame(in: Fragment) -> @location(0) vec4f {
+    return vec4f(compress(radiance(surface(in))), 1.0);
+}
+
+@fragment
+fn sky_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return vec4f(compress(sky(at.xy)), 1.0);
+}
+
+// Light and shape. Visibility is -1 where the surface faces away from the light; depth is 0 in the sky.
+struct Picture {
+    @location(0) radiance_visibility: vec4f,
+    @location(1) normal_depth: vec4f,
+}
+
+@fragment
+fn mesh_picture(in: Fragment) -> Picture {
+    let s = surface(in);
+    let visibility = select(-1.0, s.visibility, s.is_facing);
+    let depth = dot(view.forward, s.position);
+    return Picture(vec4f(radiance(s), visibility), vec4f(s.shading_normal, depth));
+}
+
+@fragment
+fn sky_picture(@builtin(position) at: vec4f) -> Picture {
+    return Picture(vec4f(sky(at.xy), 1.0), vec4f(0.0));
+}
+
+// Where the maps' texels lie: texel coordinates, index of the map in the plan (-1: none), pixels per texel (0: none).
+@fragment
+fn mesh_texels(in: Fragment) -> @location(0) vec4f {
+    let s = surface(in);
+    let place = shadow_place(view.light_index, s.position);
+    if (place.map == SHADOW_NONE) {
+        return vec4f(0.0, 0.0, -1.0, 0.0);
+    }
+    let point = shadow_point(place.map, s.position);
+    // How the point moves on its plane from pixel to pixel.
+    let ray = view.ray + in.clip.x * view.ray_x + in.clip.y * view.ray_y;
+    let across = dot(s.normal, ray);
+    let depth = dot(view.forward, s.position);
+    let step_x = depth * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));
+    let step_y = depth * view.grid * (view.ray_y - ray * (dot(s.normal, view.ray_y) / across));
+    // Texels per pixel; the larger singular value of the inverse.
+    let column_x = vec2f(dot(point.grad_s, step_x), dot(point.grad_t, step_x));
+    let column_y = vec2f(dot(point.grad_s, step_y), dot(point.grad_t, step_y));
+    let xx = dot(column_x, column_x);
+    let yy = dot(column_y, column_y);
+    let xy = dot(column_x, column_y);
+    let half_difference = 0.5 * (xx - yy);
+    let largest = sqrt(0.5 * (xx + yy) + sqrt(half_difference * half_difference + xy * xy));
+    let determinant = abs(column_x.x * column_y.y - column_x.y * column_y.x);
+    let error = largest / max(determinant, 1e-30);
+    return vec4f(place.texel, f32(shadow_maps[place.map].index), error);
+}
+
+@fragment
+fn sky_texels(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return vec4f(0.0, 0.0, -1.0, 0.0);
+}

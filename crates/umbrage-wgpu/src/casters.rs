@@ -1,0 +1,182 @@
+use crate::{Shadows, data, wgsl};
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DVec3, Vec4};
+use std::mem::size_of;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, BufferUsages, Device,
+    FragmentState, PipelineCompilationOptions, PipelineLayoutDescriptor, RenderPipeline,
+    RenderPipelineDescriptor, Sampler, SamplerBindingType, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages, TextureSampleType, TextureView, TextureViewDimension, VertexAttribute,
+    VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
+};
+
+/// Draws plain meshes, instanced, into shadow maps: positions times a matrix, and an alpha mask if there is one.
+#[derive(Debug)]
+pub struct MeshCasters {
+    pipeline: RenderPipeline,
+    mask_layout: Option<BindGroupLayout>,
+}
+
+/// Which meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshKind {
+    /// Without holes.
+    Opaque,
+    /// Where alpha is below a cutoff nothing casts.
+    Masked,
+}
+
+/// An instance of a mesh, as the vertex buffer holds it.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CasterInstance {
+    /// The three rows of the matrix from mesh to render space.
+    pub render_from_mesh: [Vec4; 3],
+}
+
+/// The alpha of a masked material: `factor` times the texture's.
+#[derive(Clone, Copy, Debug)]
+pub struct Mask<'a> {
+    /// Its alpha counts; sampled at its first level.
+    pub texture: &'a TextureView,
+    /// A filtering sampler.
+    pub sampler: &'a Sampler,
+    /// What the texture's alpha is multiplied with.
+    pub factor: f32,
+    /// Below this there is no surface.
+    pub cutoff: f32,
+}
+
+impl CasterInstance {
+    /// Layout of a vertex buffer of instances, at shader locations 1, 2 and 3.
+    pub const LAYOUT: VertexBufferLayout<'static> = VertexBufferLayout {
+        array_stride: size_of::<Self>() as u64,
+        step_mode: VertexStepMode::Instance,
+        attributes: &[row(0), row(1), row(2)],
+    };
+
+    /// An instance that stands in the world where `world_from_mesh` puts it.
+    pub fn new(world_from_mesh: &DAffine3, render_origin: DVec3) -> Self {
+        let m = world_from_mesh.matrix3;
+        let t = world_from_mesh.translation - render_origin;
+        let row = |i: usize| m.row(i).extend(t[i]).as_vec4();
+        Self { render_from_mesh: [row(0), row(1), row(2)] }
+    }
+}
+
+const fn row(i: u32) -> VertexAttribute {
+    VertexAttribute {
+        format: VertexFormat::Float32x4,
+        offset: 16 * i as u64,
+        shader_location: 1 + i,
+    }
+}
+
+impl MeshCasters {
+    /// A pipeline for vertices of this layout: `buffers` have the position (`Float32x3`) at shader location 0, the
+    /// instance's rows at locations 1 to 3 (as [`CasterInstance::LAYOUT`] has them), and for masked meshes texture
+    /// coordinates (`Float32x2`) at location 4.
+    pub fn new(
+        device: &Device,
+        shadows: &Shadows,
+        kind: MeshKind,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+    ) -> Self {
+        let is_masked = kind == MeshKind::Masked;
+        let support = shadows.support();
+        let module = device.create_shader_module(ShaderModuleDescriptor {
+            label: Some("shadow casters"),
+            source: ShaderSource::Wgsl(wgsl::mesh(support, is_masked).into()),
+        });
+        let mask_layout = is_masked.then(|| mask_layout(device));
+        let layouts = [Some(shadows.caster_layout()), mask_layout.as_ref()];
+        let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: Some("shadow casters"),
+            bind_group_layouts: &layouts[..1 + usize::from(is_masked)],
+            immediate_size: 0,
+        });
+        // What has neither holes nor depths of its own needs no fragment shader.
+        let has_fragment = is_masked || !support.depth_clip_control;
+        let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
+            label: Some("shadow casters"),
+            layout: Some(&layout),
+            vertex: VertexState {
+                module: &module,
+                entry_point: Some("shadow_mesh_vertex"),
+                compilation_options: PipelineCompilationOptions::default(),
+                buffers,
+            },
+            primitive: shadows.primitive_state(),
+            depth_stencil: Some(shadows.depth_stencil_state()),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: has_fragment.then(|| FragmentState {
+                module: &module,
+                entry_point: Some("shadow_mesh_fragment"),
+                compilation_options: PipelineCompilationOptions::default(),
+                targets: &[],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { pipeline, mask_layout }
+    }
+
+    /// Set it in a [`MapPass`](crate::MapPass), then vertex buffers as told and an index buffer, and draw. Masked meshes take
+    /// their [mask](Self::mask) in bind group 1.
+    pub fn pipeline(&self) -> &RenderPipeline {
+        &self.pipeline
+    }
+
+    /// The bind group of a mask; `None` if the pipeline is not for masked meshes.
+    pub fn mask(&self, device: &Device, mask: &Mask<'_>) -> Option<BindGroup> {
+        let layout = self.mask_layout.as_ref()?;
+        let uniform = device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("shadow mask"),
+            contents: bytemuck::bytes_of(&data::Mask { factor: mask.factor, cutoff: mask.cutoff }),
+            usage: BufferUsages::UNIFORM,
+        });
+        let entry = |binding, resource| BindGroupEntry { binding, resource };
+        Some(device.create_bind_group(&BindGroupDescriptor {
+            label: Some("shadow mask"),
+            layout,
+            entries: &[
+                entry(0, uniform.as_entire_binding()),
+                entry(1, BindingResource::TextureView(mask.texture)),
+                entry(2, BindingResource::Sampler(mask.sampler)),
+            ],
+        }))
+    }
+}
+
+fn mask_layout(device: &Device) -> BindGroupLayout {
+    let entry = |binding, ty| BindGroupLayoutEntry {
+        binding,
+        visibility: ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+        label: Some("shadow mask"),
+        entries: &[
+            entry(
+                0,
+                BindingType::Buffer {
+                    ty: BufferBindingType::Uniform,
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+            ),
+            entry(
+                1,
+                BindingType::Texture {
+                    sample_type: TextureSampleType::Float { filterable: true },
+                    view_dimension: TextureViewDimension::D2,
+                    multisampled: false,
+                },
+            ),
+            entry(2, BindingType::Sampler(SamplerBindingType::Filtering)),
+        ],
+    })
+}

@@ -1,0 +1,170 @@
+//! What shaders read, as they read it: `wgsl/lookup.wgsl` and `wgsl/caster.wgsl` have the same structs.
+
+use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
+use crate::{Bias, Error, Support};
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec3, DVec4, Mat4, Vec4};
+use umbrage::{Place, Plan, ShadowMap};
+
+/// `ShadowSettings`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Settings {
+    pub(crate) bias_texels: f32,
+    pub(crate) bias_metres: f32,
+    pub(crate) light_count: u32,
+    pub(crate) padding: u32,
+    pub(crate) texture_scale: [f32; 2],
+}
+
+/// `ShadowLight`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Light {
+    pub(crate) first_map: u32,
+    pub(crate) map_count: u32,
+    pub(crate) padding: [u32; 2],
+}
+
+/// `ShadowMap`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Map {
+    pub(crate) s: Vec4,
+    pub(crate) t: Vec4,
+    pub(crate) depth: Vec4,
+    pub(crate) w: Vec4,
+    pub(crate) fade_from: Vec4,
+    pub(crate) size: [f32; 2],
+    pub(crate) origin: [f32; 2],
+    pub(crate) layer: u32,
+    pub(crate) first_plane: u32,
+    pub(crate) plane_count: u32,
+    pub(crate) index: u32,
+}
+
+/// `ShadowCasterMap`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct CasterMap {
+    pub(crate) clip_from_render: Mat4,
+}
+
+/// `ShadowMask`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Mask {
+    pub(crate) factor: f32,
+    pub(crate) cutoff: f32,
+}
+
+/// All that lookup reads. Empty maps are left out.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Lookup {
+    pub(crate) settings: Settings,
+    pub(crate) lights: Vec<Light>,
+    pub(crate) maps: Vec<Map>,
+    pub(crate) planes: Vec<Vec4>,
+}
+
+/// Where maps lie in which texture, and where render space does.
+pub(crate) struct Placed<'a> {
+    pub(crate) places: &'a [Option<Place>],
+    pub(crate) texture_size: [u32; 2],
+    pub(crate) render_origin: DVec3,
+    pub(crate) bias: Bias,
+}
+
+impl Lookup {
+    /// Tells of a plan's maps, in the buffers of the one before.
+    pub(crate) fn fill(&mut self, plan: &Plan, placed: &Placed<'_>) {
+        let Self { settings, lights, maps, planes } = self;
+        lights.clear();
+        maps.clear();
+        planes.clear();
+        for light in &plan.lights {
+            let first_map = maps.len() as u32;
+            for index in light.maps.clone() {
+                if let Some(place) = placed.places[index] {
+                    let map = &plan.maps[index];
+                    maps.push(Map::new(map, index, &place, planes, placed.render_origin));
+                }
+            }
+            let map_count = maps.len() as u32 - first_map;
+            lights.push(Light { first_map, map_count, padding: [0; 2] });
+        }
+        *settings = Settings {
+            bias_texels: placed.bias.texels,
+            bias_metres: placed.bias.metres,
+            light_count: lights.len() as u32,
+            padding: 0,
+            texture_scale: placed.texture_size.map(|n| 1.0 / n.max(1) as f32),
+        };
+    }
+
+    /// Whether the device can be told of so many.
+    pub(crate) fn check(&self, support: &Support) -> Result<(), Error> {
+        let counts = [
+            ("lights", self.lights.len(), MAX_LIGHTS),
+            ("maps", self.maps.len(), MAX_MAPS),
+            ("planes around what maps serve", self.planes.len(), MAX_PLANES),
+        ];
+        match counts.into_iter().find(|&(_, given, max)| given > max) {
+            Some((what, given, max)) if !support.storage_buffers => {
+                Err(Error::TooMany { what, given, max })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Map {
+    fn new(
+        map: &ShadowMap,
+        index: usize,
+        place: &Place,
+        planes: &mut Vec<Vec4>,
+        render_origin: DVec3,
+    ) -> Self {
+        let local_from_render = local_from_render(map, render_origin);
+        let m = map.shadow_from_local * local_from_render;
+        let size = place.size.map(f64::from);
+        let plane = |p: umbrage::Plane| {
+            p.normal.extend(p.offset + p.normal.dot(local_from_render.w_axis.truncate())).as_vec4()
+        };
+        let first_plane = planes.len() as u32;
+        planes.extend(map.cell.iter().map(|&p| plane(p)));
+        Self {
+            s: (m.row(0) * size[0]).as_vec4(),
+            t: (m.row(1) * size[1]).as_vec4(),
+            depth: m.row(2).as_vec4(),
+            w: m.row(3).as_vec4(),
+            // Nothing lies on the negative side of the plane that is at infinity.
+            fade_from: map.fade_from.map_or(Vec4::W, plane),
+            size: place.size.map(|n| n as f32),
+            origin: place.origin.map(|n| n as f32),
+            layer: place.layer,
+            first_plane,
+            plane_count: map.cell.len() as u32,
+            index: index as u32,
+        }
+    }
+}
+
+/// From render space to a map's local space.
+pub(crate) fn local_from_render(map: &ShadowMap, render_origin: DVec3) -> DMat4 {
+    DMat4::from_translation(render_origin - map.origin)
+}
+
+/// From render space to the clip space of a viewport that covers a map and the `gutter` around it.
+pub(crate) fn clip_from_render(map: &ShadowMap, gutter: u32, render_origin: DVec3) -> DMat4 {
+    let m = map.shadow_from_local * local_from_render(map, render_origin);
+    let w = m.row(3);
+    let across = |row: DVec4, n: u32| {
+        let [map, gutter] = [n, gutter].map(f64::from);
+        (row * map + w * gutter) * (2.0 / (map + 2.0 * gutter)) - w
+    };
+    // The first row of texels is the uppermost one of a viewport, where clip space has y = 1.
+    let [x, y] = [across(m.row(0), map.resolution[0]), -across(m.row(1), map.resolution[1])];
+    DMat4::from_cols(x, y, m.row(2), w).transpose()
+}

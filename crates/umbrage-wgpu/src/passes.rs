@@ -1,0 +1,172 @@
+//! The passes that draw casters into maps.
+
+use crate::shadows::{Record, Shadows, depth_state};
+use glam::{DVec3, Mat4};
+use umbrage::{Place, Plan, ShadowMap};
+use wgpu::{
+    CommandEncoder, CompareFunction, Device, LoadOp, Operations, PipelineCompilationOptions,
+    PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassDepthStencilAttachment,
+    RenderPassDescriptor, RenderPassTimestampWrites, RenderPipeline, RenderPipelineDescriptor,
+    ShaderModuleDescriptor, ShaderSource, StoreOp, TextureView, VertexState,
+};
+
+/// A frame whose maps can be drawn now.
+#[derive(Debug)]
+#[must_use = "maps are drawn only if their passes are encoded"]
+pub struct Prepared<'a> {
+    pub(crate) shadows: &'a mut Shadows,
+    pub(crate) plan: &'a Plan,
+    pub(crate) render_origin: DVec3,
+}
+
+/// A map's turn in a depth pass. Bind group 0 has the map's matrix already, as
+/// [`Shadows::caster_wgsl`] takes it, and viewport and scissor are set; leave these two as they are.
+#[derive(Debug)]
+pub struct MapPass<'p, 'e> {
+    /// Draw casters into this.
+    pub pass: &'p mut RenderPass<'e>,
+    /// The map: [`may_cast`](ShadowMap::may_cast) says which casters to leave out, or its caster planes.
+    pub map: &'p ShadowMap,
+    /// Its index in the plan.
+    pub index: usize,
+    /// From render space to the pass's clip space, for pipelines that do not take it from bind group 0.
+    pub clip_from_render: Mat4,
+    /// World position of render space's origin, metres.
+    pub render_origin: DVec3,
+}
+
+impl Prepared<'_> {
+    /// Indices in the plan of the maps that will be drawn. Others are drawn already, or empty.
+    pub fn stale(&self) -> impl Iterator<Item = usize> + '_ {
+        let records = self.shadows.records.iter().enumerate();
+        records.filter(|(_, r)| r.stale_place().is_some()).map(|(index, _)| index)
+    }
+
+    /// Encodes the passes in which `draw` draws all casters of one map after the other. Maps that are as they were, and
+    /// empty ones, are left out; without any there is no pass at all, and no timestamp is written.
+    ///
+    /// Returns how many maps were drawn. The passes must be submitted before those that look the maps up, in
+    /// the same encoder or an earlier one.
+    pub fn encode(
+        self,
+        encoder: &mut CommandEncoder,
+        timestamps: Option<RenderPassTimestampWrites<'_>>,
+        mut draw: impl FnMut(&mut MapPass<'_, '_>),
+    ) -> usize {
+        let Self { shadows, plan, render_origin } = self;
+        let gutter = shadows.options().filter.reach_texels();
+        let Shadows { records, texture, clear, casters, .. } = shadows;
+        let stale_in = |layer: usize| {
+            records.iter().enumerate().filter_map(move |(index, record)| {
+                let place = record.stale_place().filter(|p| p.layer as usize == layer)?;
+                Some((index, record, place))
+            })
+        };
+        let is_stale = |&layer: &usize| stale_in(layer).next().is_some();
+        let stale_layers = || (0..texture.layers.len()).filter(is_stale);
+        let [first, last] = [stale_layers().next(), stale_layers().next_back()];
+        let mut drawn = 0;
+        for layer in stale_layers() {
+            // A layer that is drawn whole is cleared whole, which costs least.
+            let in_layer = |r: &&Record| r.place.is_some_and(|p| p.layer as usize == layer);
+            let is_whole = records.iter().filter(in_layer).all(|r| r.stale_place().is_some());
+            let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
+            let timestamps = timestamps.as_ref().and_then(|t| {
+                let begin = t.beginning_of_pass_write_index.filter(|_| Some(layer) == first);
+                let end = t.end_of_pass_write_index.filter(|_| Some(layer) == last);
+                (begin.is_some() || end.is_some()).then_some(RenderPassTimestampWrites {
+                    query_set: t.query_set,
+                    beginning_of_pass_write_index: begin,
+                    end_of_pass_write_index: end,
+                })
+            });
+            let mut pass = begin(encoder, &texture.layers[layer], load, timestamps);
+            for (index, record, place) in stale_in(layer) {
+                aim(&mut pass, &place, gutter);
+                if !is_whole {
+                    pass.set_pipeline(&clear.pipeline);
+                    pass.draw(0..3, 0..1);
+                }
+                pass.set_bind_group(0, &casters.bind_group, &[index as u32 * casters.stride]);
+                draw(&mut MapPass {
+                    pass: &mut pass,
+                    map: &plan.maps[index],
+                    index,
+                    clip_from_render: record.clip_from_render.as_mat4(),
+                    render_origin,
+                });
+                drawn += 1;
+            }
+        }
+        for record in records.iter_mut() {
+            record.is_drawn = record.place.is_some();
+        }
+        texture.is_fresh &= drawn == 0;
+        drawn
+    }
+}
+
+fn begin<'e>(
+    encoder: &'e mut CommandEncoder,
+    view: &TextureView,
+    load: LoadOp<f32>,
+    timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
+) -> RenderPass<'e> {
+    encoder.begin_render_pass(&RenderPassDescriptor {
+        label: Some("shadow maps"),
+        color_attachments: &[],
+        depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+            view,
+            depth_ops: Some(Operations { load, store: StoreOp::Store }),
+            stencil_ops: None,
+        }),
+        timestamp_writes,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    })
+}
+
+/// Sets viewport and scissor to a map with its gutter.
+fn aim(pass: &mut RenderPass<'_>, place: &Place, gutter: u32) {
+    let [x, y] = place.origin.map(|n| n - gutter);
+    let [w, h] = place.size.map(|n| n + 2 * gutter);
+    pass.set_viewport(x as f32, y as f32, w as f32, h as f32, 0.0, 1.0);
+    pass.set_scissor_rect(x, y, w, h);
+}
+
+/// Clears a part of a layer.
+#[derive(Debug)]
+pub(crate) struct Clear {
+    pipeline: RenderPipeline,
+}
+
+impl Clear {
+    pub(crate) fn new(device: &Device) -> Self {
+        let module = device.create_shader_module(ShaderModuleDescriptor {
+            label: Some("shadow clear"),
+            source: ShaderSource::Wgsl(include_str!("wgsl/clear.wgsl").into()),
+        });
+        let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: Some("shadow clear"),
+            bind_group_layouts: &[],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
+            label: Some("shadow clear"),
+            layout: Some(&layout),
+            vertex: VertexState {
+                module: &module,
+                entry_point: None,
+                compilation_options: PipelineCompilationOptions::default(),
+                buffers: &[],
+            },
+            primitive: PrimitiveState::default(),
+            depth_stencil: Some(depth_state(CompareFunction::Always)),
+            multisample: wgpu::MultisampleState::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { pipeline }
+    }
+}

@@ -1,0 +1,183 @@
+//! Where in the depth texture the maps lie, from frame to frame.
+
+use crate::{Error, Layout, Support};
+use umbrage::{Atlas, Place, Plan};
+
+/// An atlas in which maps stay where they are while they fit.
+///
+/// The sizes of a plan's maps change a little whenever the camera moves. Packing them anew each frame would
+/// cost time and memory, and move maps that could stay. So each map has a slot, and is packed anew only where it
+/// outgrows it. The first packing is exact, as sizes may never change; from the second on slots have room to grow.
+#[derive(Debug, Default)]
+pub(crate) struct Slots {
+    /// Its places are as large as the slots.
+    atlas: Atlas,
+    /// As large as the maps.
+    places: Vec<Option<Place>>,
+    was_packed: bool,
+    sizes: Vec<[u32; 2]>,
+}
+
+/// Slots are larger than what they hold by one part in this many, at least.
+const ROOM: u32 = 8;
+/// An atlas with more than this many times the texels that it needs is packed anew.
+const WASTE: u64 = 4;
+
+impl Slots {
+    /// Places of the maps, in the plan's order; `None` for empty ones.
+    pub(crate) fn places(&self) -> &[Option<Place>] {
+        &self.places
+    }
+
+    /// Size and layers of the texture that holds them.
+    pub(crate) fn size(&self) -> ([u32; 2], u32) {
+        (self.atlas.size, self.atlas.layers)
+    }
+
+    /// Finds a place for each map; `true` if they were packed anew.
+    pub(crate) fn place(
+        &mut self,
+        plan: &Plan,
+        layout: Layout,
+        gutter: u32,
+        support: &Support,
+    ) -> Result<bool, Error> {
+        self.sizes.clear();
+        self.sizes.extend(plan.maps.iter().map(|m| m.resolution));
+        let moves = !self.holds_all() || self.wastes();
+        if moves {
+            // Without room rather than not at all.
+            let roomy = self.was_packed.then(|| self.pack(layout, true, gutter, support));
+            self.atlas = match roomy {
+                Some(Ok(atlas)) => atlas,
+                _ => self.pack(layout, false, gutter, support)?,
+            };
+            self.was_packed = true;
+        }
+        let sizes = self.sizes.iter().zip(&self.atlas.places);
+        let places = sizes.map(|(&size, slot)| {
+            slot.filter(|_| !size.contains(&0)).map(|slot| Place { size, ..slot })
+        });
+        self.places.clear();
+        self.places.extend(places);
+        Ok(moves)
+    }
+
+    fn holds_all(&self) -> bool {
+        let fits = |(size, slot): (&[u32; 2], &Option<Place>)| {
+            let room = slot.map_or([0; 2], |s| s.size);
+            size.contains(&0) || (size[0] <= room[0] && size[1] <= room[1])
+        };
+        self.sizes.len() == self.atlas.places.len()
+            && self.sizes.iter().zip(&self.atlas.places).all(fits)
+    }
+
+    fn wastes(&self) -> bool {
+        let texels = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
+        let slots = self.sizes.iter().zip(&self.atlas.places);
+        // Empty maps may be so for a moment only.
+        let full = slots.filter_map(|(&size, slot)| (!size.contains(&0)).then_some((size, (*slot)?)));
+        let [needed, taken] = full.fold([0, 0], |[needed, taken], (size, slot)| {
+            [needed + texels(size), taken + texels(slot.size)]
+        });
+        taken > WASTE * needed
+    }
+
+    fn pack(
+        &self,
+        layout: Layout,
+        with_room: bool,
+        gutter: u32,
+        support: &Support,
+    ) -> Result<Atlas, Error> {
+        let max_side = support.max_side;
+        let roomy = |n: u32| {
+            let most = max_side.saturating_sub(2 * gutter).max(n);
+            (n + n.div_ceil(ROOM)).min(most)
+        };
+        let slot = |size: [u32; 2]| {
+            if with_room && !size.contains(&0) { size.map(roomy) } else { size }
+        };
+        let slots: Vec<[u32; 2]> = self.sizes.iter().copied().map(slot).collect();
+        let fits = layout == Layout::Atlas || slots.len() <= support.max_layers as usize;
+        if !fits {
+            return Err(Error::Invalid {
+                field: "options.layout",
+                problem: format!(
+                    "{} maps do not fit into {} layers: take `Layout::Atlas`",
+                    slots.len(),
+                    support.max_layers
+                ),
+            });
+        }
+        Ok(match layout {
+            Layout::Atlas => Atlas::packed_sizes(&slots, gutter, max_side)?,
+            Layout::Layers => Atlas::layered_sizes(&slots, gutter, max_side)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbrage::ShadowMap;
+
+    const SUPPORT: Support = Support {
+        depth_clip_control: true,
+        storage_buffers: true,
+        depth_fetch: true,
+        max_side: 1024,
+        max_layers: 4,
+        uniform_alignment: 256,
+    };
+
+    fn plan(sizes: &[[u32; 2]]) -> Plan {
+        let map = |&resolution: &[u32; 2]| ShadowMap { resolution, ..ShadowMap::default() };
+        Plan { maps: sizes.iter().map(map).collect(), ..Plan::default() }
+    }
+
+    fn place(slots: &mut Slots, sizes: &[[u32; 2]]) -> bool {
+        slots.place(&plan(sizes), Layout::Atlas, 2, &SUPPORT).unwrap()
+    }
+
+    #[test]
+    fn maps_stay_where_they_are_while_they_fit() {
+        let mut slots = Slots::default();
+        assert!(place(&mut slots, &[[100, 200], [0, 0], [64, 64]]));
+        assert!(!place(&mut slots, &[[100, 200], [0, 0], [64, 64]]));
+        assert!(!place(&mut slots, &[[90, 180], [0, 0], [50, 64]]));
+        assert_eq!(slots.places()[0].unwrap().size, [90, 180]);
+        assert_eq!(slots.places()[1], None);
+        // Sizes change, as they have just shown: from now on there is room.
+        assert!(place(&mut slots, &[[101, 200], [0, 0], [64, 64]]));
+        let before = slots.places().to_vec();
+        assert!(!place(&mut slots, &[[110, 210], [0, 0], [64, 70]]));
+        let origins = |p: &[Option<Place>]| p.iter().map(|p| p.map(|p| p.origin)).collect::<Vec<_>>();
+        assert_eq!(origins(slots.places()), origins(&before));
+        // An empty map keeps its slot.
+        assert!(!place(&mut slots, &[[0, 0], [0, 0], [64, 70]]));
+        assert!(!place(&mut slots, &[[110, 210], [0, 0], [64, 70]]));
+        assert!(place(&mut slots, &[[110, 210], [8, 8], [64, 70]]));
+    }
+
+    #[test]
+    fn room_is_given_up_where_there_is_none_and_waste_is_taken_back() {
+        let mut slots = Slots::default();
+        assert!(place(&mut slots, &[[8, 8]]));
+        assert!(place(&mut slots, &[[1020, 1020]]));
+        assert_eq!(slots.size(), ([1024, 1024], 1));
+        assert!(place(&mut slots, &[[100, 100]]));
+        assert!(slots.size().0[0] < 200);
+    }
+
+    #[test]
+    fn what_cannot_fit_is_an_error() {
+        let mut slots = Slots::default();
+        let error = slots.place(&plan(&[[1022, 8]]), Layout::Atlas, 2, &SUPPORT).unwrap_err();
+        assert!(error.to_string().contains("no room for 1 shadow maps"), "{error}");
+        let five = plan(&[[8, 8]; 5]);
+        let error = slots.place(&five, Layout::Layers, 2, &SUPPORT).unwrap_err();
+        assert!(error.to_string().contains("5 maps do not fit into 4 layers"), "{error}");
+        assert!(slots.place(&five, Layout::Atlas, 2, &SUPPORT).unwrap());
+    }
+}

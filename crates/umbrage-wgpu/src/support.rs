@@ -1,0 +1,120 @@
+use crate::Error;
+use wgpu::{Adapter, Backend, Device, DownlevelFlags, Features, Limits};
+
+/// What a device can do, as far as shadows need it: the one place where that is decided.
+///
+/// | lacking | then |
+/// | --- | --- |
+/// | [`Features::DEPTH_CLIP_CONTROL`] | casters before a map's depths are clamped in the fragment shader, which writes depth: slower, the same picture |
+/// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold 16 lights, 64 maps and 512 planes |
+/// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` |
+/// | comparison samplers, where depths cannot be fetched | [`Error::Unsupported`] |
+///
+/// Fields are public so that a fallback can be forced: set one to `false`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Support {
+    /// Whether the device clamps depths by itself.
+    pub depth_clip_control: bool,
+    /// Whether fragment shaders read storage buffers.
+    pub storage_buffers: bool,
+    /// Whether shaders fetch single depths.
+    pub depth_fetch: bool,
+    /// The longest side of a texture, texels.
+    pub max_side: u32,
+    /// Layers of a texture.
+    pub max_layers: u32,
+    /// Multiple of which offsets into uniform buffers must be, bytes.
+    pub(crate) uniform_alignment: u32,
+}
+
+/// Storage buffers that lookup takes.
+const STORAGE_BUFFERS: u32 = 3;
+
+impl Support {
+    /// Features that make shadows faster. Ask for those of them that the adapter has when you create
+    /// your device; none is needed.
+    pub const WANTED_FEATURES: Features = Features::DEPTH_CLIP_CONTROL;
+
+    /// What a device can do that was created from `adapter`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where shadows are out of its reach.
+    pub fn new(adapter: &Adapter, device: &Device) -> Result<Self, Error> {
+        let flags = adapter.get_downlevel_capabilities().flags;
+        Self::of(device.features(), &device.limits(), flags, adapter.get_info().backend)
+    }
+
+    /// The same from what [`new`](Self::new) asks the device.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn of(
+        features: Features,
+        limits: &Limits,
+        flags: DownlevelFlags,
+        backend: Backend,
+    ) -> Result<Self, Error> {
+        // GLSL has no way to fetch from what it also compares with.
+        let depth_fetch = backend != Backend::Gl;
+        if !depth_fetch && !flags.contains(DownlevelFlags::COMPARISON_SAMPLERS) {
+            return Err(Error::Unsupported {
+                what: "comparison samplers",
+                why: "without which depths cannot be compared: take another backend or device",
+            });
+        }
+        if limits.max_texture_dimension_2d < 2 || limits.max_uniform_buffer_binding_size < 16 << 10 {
+            return Err(Error::Unsupported {
+                what: "16 KiB of uniforms and textures of 2x2 texels",
+                why: "without which there is no room for a shadow map: raise the limits that you ask for",
+            });
+        }
+        let storage_buffers = flags.contains(DownlevelFlags::FRAGMENT_STORAGE)
+            && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS;
+        Ok(Self {
+            depth_clip_control: features.contains(Features::DEPTH_CLIP_CONTROL),
+            storage_buffers,
+            depth_fetch,
+            max_side: limits.max_texture_dimension_2d,
+            max_layers: limits.max_texture_array_layers,
+            uniform_alignment: limits.min_uniform_buffer_offset_alignment.max(1),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn webgl2() -> DownlevelFlags {
+        DownlevelFlags::COMPARISON_SAMPLERS
+    }
+
+    #[test]
+    fn a_webgpu_device_needs_no_fallback_but_for_clamping() {
+        let flags = DownlevelFlags::compliant();
+        let of = |features| Support::of(features, &Limits::default(), flags, Backend::Vulkan);
+        let plain = of(Features::empty()).unwrap();
+        assert!(plain.storage_buffers && plain.depth_fetch && !plain.depth_clip_control);
+        assert!(of(Support::WANTED_FEATURES).unwrap().depth_clip_control);
+        assert_eq!([plain.max_side, plain.max_layers], [8192, 256]);
+    }
+
+    #[test]
+    fn a_webgl2_class_device_falls_back() {
+        let limits = Limits::downlevel_webgl2_defaults();
+        let support = Support::of(Features::empty(), &limits, webgl2(), Backend::Gl).unwrap();
+        assert!(!support.storage_buffers && !support.depth_fetch);
+        assert_eq!(support.max_side, 2048);
+    }
+
+    #[test]
+    fn what_cannot_be_done_without_is_named() {
+        let limits = Limits::downlevel_webgl2_defaults();
+        let none = DownlevelFlags::empty();
+        let error = Support::of(Features::empty(), &limits, none, Backend::Gl).unwrap_err();
+        assert!(error.to_string().contains("comparison samplers"), "{error}");
+        let tiny = Limits { max_texture_dimension_2d: 1, ..limits };
+        let error = Support::of(Features::empty(), &tiny, webgl2(), Backend::Gl).unwrap_err();
+        assert!(error.to_string().contains("textures of 2x2"), "{error}");
+    }
+}

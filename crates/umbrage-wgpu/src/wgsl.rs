@@ -1,0 +1,213 @@
+//! Shader text, put together for a device, a filter and a bind group.
+
+use crate::{Comparison, Support};
+use umbrage::visibility::Filter;
+
+/// What a device without storage buffers can be told of: sizes of the uniform arrays.
+pub(crate) const MAX_LIGHTS: usize = 16;
+pub(crate) const MAX_MAPS: usize = 64;
+pub(crate) const MAX_PLANES: usize = 512;
+
+/// The lookup module, its bindings in bind group `group`.
+pub(crate) fn lookup(
+    group: u32,
+    filter: Filter,
+    comparison: Comparison,
+    storage_buffers: bool,
+) -> String {
+    let array = |n: usize| if storage_buffers { String::new() } else { format!(", {n}") };
+    let sampler = match comparison {
+        Comparison::PerTexel => "sampler",
+        Comparison::Hardware => "sampler_comparison",
+    };
+    let bindings = include_str!("wgsl/bindings.wgsl")
+        .replace("{GROUP}", &group.to_string())
+        .replace("{SPACE}", if storage_buffers { "storage, read" } else { "uniform" })
+        .replace("{LIGHTS}", &array(MAX_LIGHTS))
+        .replace("{MAPS}", &array(MAX_MAPS))
+        .replace("{PLANES}", &array(MAX_PLANES))
+        .replace("{SAMPLER}", sampler);
+    let mut text = format!("{}\n{bindings}\n", include_str!("wgsl/lookup.wgsl"));
+    if comparison == Comparison::Hardware {
+        text += include_str!("wgsl/hardware.wgsl");
+        text += "\n";
+    }
+    text += &filtered(filter, comparison);
+    text
+}
+
+/// The function that tells how much of a map's texels around a receiver let light through.
+fn filtered(filter: Filter, comparison: Comparison) -> String {
+    let (hard, pcf) = match comparison {
+        Comparison::PerTexel => (include_str!("wgsl/hard.wgsl"), include_str!("wgsl/pcf.wgsl")),
+        Comparison::Hardware => {
+            (include_str!("wgsl/hardware_hard.wgsl"), include_str!("wgsl/hardware_pcf.wgsl"))
+        }
+    };
+    match filter {
+        Filter::Pcf { n } => pcf.replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string()),
+        _ => hard.to_owned(),
+    }
+}
+
+/// The casters' module, its binding in bind group `group`.
+pub(crate) fn caster(group: u32, support: &Support) -> String {
+    let clip = if support.depth_clip_control {
+        include_str!("wgsl/caster_clamped.wgsl")
+    } else {
+        include_str!("wgsl/caster_emulated.wgsl")
+    };
+    include_str!("wgsl/caster.wgsl").replace("{GROUP}", &group.to_string()) + clip
+}
+
+/// Plain meshes, with the casters' module in bind group 0 and the mask in group 1.
+pub(crate) fn mesh(support: &Support, is_masked: bool) -> String {
+    let flags = [("MASK", is_masked), ("EMULATED", !support.depth_clip_control)];
+    format!("{}\n{}", caster(0, support), choose(include_str!("wgsl/mesh.wgsl"), &flags))
+}
+
+/// Keeps of `//IF NAME` … `//ELSE` … `//END` what its flag says; blocks nest.
+fn choose(text: &str, flags: &[(&str, bool)]) -> String {
+    let mut stack: Vec<bool> = Vec::new();
+    let mut chosen = String::new();
+    for line in text.lines() {
+        match line.trim().split_once(' ').unwrap_or((line.trim(), "")) {
+            ("//IF", name) => stack.push(flags.iter().any(|&(flag, is_set)| flag == name && is_set)),
+            ("//ELSE", _) => {
+                if let Some(is_kept) = stack.last_mut() {
+                    *is_kept = !*is_kept;
+                }
+            }
+            ("//END", _) => {
+                stack.pop();
+            }
+            _ if stack.iter().all(|&is_kept| is_kept) => {
+                chosen.push_str(line);
+                chosen.push('\n');
+            }
+            _ => {}
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data;
+    use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+    use std::mem::{offset_of, size_of};
+
+    const SUPPORT: Support = Support {
+        depth_clip_control: true,
+        storage_buffers: true,
+        depth_fetch: true,
+        max_side: 8192,
+        max_layers: 256,
+        uniform_alignment: 256,
+    };
+
+    fn validated(text: &str) -> (naga::Module, ModuleInfo) {
+        let module = naga::front::wgsl::parse_str(text)
+            .unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        let info = validator.validate(&module);
+        let info = info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+        (module, info)
+    }
+
+    /// A user's shader: everything that may be called is, from a fragment shader.
+    const USER: &str = "
+        @fragment
+        fn user(@location(0) position: vec3f, @location(1) normal: vec3f) -> @location(0) vec4f {
+            let place = shadow_place(1u, position);
+            let given = shadow_visibility(0u, position, normal);
+            return vec4f(given, shadow_visibility(1u, position, shadow_normal(position)), place.texel);
+        }";
+
+    fn variants() -> impl Iterator<Item = (Filter, Comparison, bool)> {
+        let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
+        filters.flat_map(|filter| {
+            let comparisons = [Comparison::PerTexel, Comparison::Hardware];
+            comparisons.into_iter().flat_map(move |c| [true, false].map(|s| (filter, c, s)))
+        })
+    }
+
+    #[test]
+    fn every_lookup_module_is_valid_in_front_of_a_users_shader() {
+        for (filter, comparison, storage) in variants() {
+            for group in [0, 3] {
+                validated(&(lookup(group, filter, comparison, storage) + USER));
+            }
+        }
+    }
+
+    #[test]
+    fn every_caster_module_is_valid() {
+        for depth_clip_control in [true, false] {
+            let support = Support { depth_clip_control, ..SUPPORT };
+            for is_masked in [true, false] {
+                let (module, _) = validated(&mesh(&support, is_masked));
+                let has_fragment = is_masked || !depth_clip_control;
+                assert_eq!(module.entry_points.len(), 1 + usize::from(has_fragment));
+            }
+        }
+        validated(include_str!("wgsl/clear.wgsl"));
+    }
+
+    #[test]
+    fn nothing_pollutes_a_users_names() {
+        for (filter, comparison, storage) in variants() {
+            let (module, _) = validated(&lookup(1, filter, comparison, storage));
+            let functions = module.functions.iter().filter_map(|(_, f)| f.name.as_deref());
+            let globals = module.global_variables.iter().filter_map(|(_, g)| g.name.as_deref());
+            let constants = module.constants.iter().filter_map(|(_, c)| c.name.as_deref());
+            let types = module.types.iter().filter_map(|(_, t)| t.name.as_deref());
+            for name in functions.chain(globals).chain(constants).chain(types) {
+                assert!(name.to_lowercase().starts_with("shadow"), "{name}");
+            }
+        }
+    }
+
+    /// Offsets and size of a struct as naga lays it out.
+    fn layout(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
+        let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+        let (_, ty) = found.unwrap_or_else(|| panic!("no struct {name}"));
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };
+        let members = members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize));
+        (members.collect(), *span as usize)
+    }
+
+    macro_rules! check_layout {
+        ($module:expr, $name:literal, $type:ty, [$($field:ident),* $(,)?]) => {
+            let (members, span) = layout($module, $name);
+            let ours = vec![$((stringify!($field).to_owned(), offset_of!($type, $field))),*];
+            assert_eq!(members, ours, $name);
+            assert_eq!(span, size_of::<$type>(), $name);
+        };
+    }
+
+    #[test]
+    fn structs_are_laid_out_alike() {
+        let (module, _) = validated(&(lookup(0, Filter::Hard, Comparison::PerTexel, true) + USER));
+        let m = &module;
+        check_layout!(m, "ShadowSettings", data::Settings, [
+            bias_texels, bias_metres, light_count, texture_scale
+        ]);
+        check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, padding]);
+        check_layout!(m, "ShadowMap", data::Map, [
+            s, t, depth, w, fade_from, size, origin, layer, first_plane, plane_count, index
+        ]);
+        let (module, _) = validated(&mesh(&SUPPORT, true));
+        check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
+        check_layout!(&module, "ShadowMask", data::Mask, [factor, cutoff]);
+    }
+
+    #[test]
+    fn uniform_arrays_fit_where_least_is_guaranteed() {
+        let least = wgpu::Limits::downlevel_webgl2_defaults().max_uniform_buffer_binding_size;
+        assert!((size_of::<data::Light>() * MAX_LIGHTS) as u64 <= least);
+        assert!((size_of::<data::Map>() * MAX_MAPS) as u64 <= least);
+        assert!((size_of::<[f32; 4]>() * MAX_PLANES) as u64 <= least);
+    }
+}
