@@ -461,7 +461,6 @@ impl Render {
         self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.check()?;
         self.light.check()?;
-        self.execution.check()?;
         self.picture_kind().map(drop)
     }
 
@@ -496,7 +495,6 @@ impl Compare {
 impl ComparisonArgs {
     fn check(&mut self) -> Result<()> {
         self.texels.apply(&mut self.shadows)?;
-        self.execution.check()?;
         for (i, technique) in self.shadows.iter().enumerate() {
             let is_new = !self.shadows[..i].contains(technique);
             ensure!(is_new, "--shadows: `{}` is given twice", technique.spec);
@@ -592,28 +590,6 @@ impl LightArgs {
     /// Whether the values, each right by itself, go together.
     pub(crate) fn check(&self) -> Result<()> {
         ensure!(self.sun.is_none() || self.light.is_none(), "--light: cannot be used with --sun");
-        Ok(())
-    }
-}
-
-impl ExecutionArgs {
-    /// What renders the shadow maps in the end.
-    pub(crate) fn executor(&self) -> &'static str {
-        "reference"
-    }
-
-    /// Says which backend `auto` takes.
-    pub(crate) fn announce(&self) {
-        if self.backend == Backend::Auto {
-            crate::output::note("backend: reference, on the CPU (this version has no GPU backend)");
-        }
-    }
-
-    fn check(&self) -> Result<()> {
-        ensure!(
-            self.backend != Backend::Gpu,
-            "--backend: gpu is not built into this version yet; take reference or auto"
-        );
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::args;
 use crate::comparison::{Comparison, Stage};
+use crate::execute::Execution;
 use crate::output::{Contents, ReportFolder, aligned, command_line, note, print};
 use crate::pixels::NOTHING_TO_SHADOW;
 use crate::progress::Progress;
@@ -13,13 +14,14 @@ use umbrage_measure::{Measured, Report};
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output, Contents::Comparison)?;
     let scene = open_scene(&args.scene.name)?;
-    let stage = Stage::new(&scene, args.scene.opaque, args.comparison.fit)?;
+    let execution = Execution::open(&args.comparison.execution, &args.comparison.shadows)?;
+    let stage = Stage::new(&scene, &execution, args.scene.opaque, args.comparison.fit)?;
     let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;
     if let Some(motion) = args.motion {
         comparison.check_motion(motion, args.frames)?;
     }
     tell_notices(&scene);
-    args.comparison.execution.announce();
+    execution.announce();
     let rows_in_motion = u64::from(args.frames) * u64::from(args.view.size[1]);
     let moving = args.motion.map_or(0, |_| rows_in_motion);
     let progress = Progress::new(comparison.rows() + moving, quiet);

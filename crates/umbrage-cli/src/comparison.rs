@@ -1,8 +1,9 @@
 //! One view's comparison: techniques against ray-traced truth, as pictures, figures and a page in a folder.
 
 use crate::args;
+use crate::execute::{Execution, Executor, Sets};
 use crate::motion::{Motion, Scenery, flicker};
-use crate::pixels::{self, Shadowed, Texels, casters, casters_culled, counted, milliseconds};
+use crate::pixels::{self, Rows, Shadowed, Texels, casters, casters_culled, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker};
 use crate::spec::Technique;
@@ -17,12 +18,13 @@ use umbrage_measure::{
     write_truth_pictures,
 };
 use umbrage_scene::Scene;
-use umbrage_trace::{Reference, Tracer, View};
+use umbrage_trace::View;
 
 /// A scene, ready for rays of many views.
 pub(crate) struct Stage<'a> {
     scene: &'a Scene,
-    tracer: Tracer<'a>,
+    execution: &'a Execution,
+    sets: Sets<'a>,
     receivers: Receivers,
     opaque: bool,
 }
@@ -49,9 +51,8 @@ pub(crate) struct Compared<'a> {
 /// A technique at work: its maps, and the picture so far.
 struct Contender<'a> {
     technique: &'a Technique,
-    backend: &'static str,
     plan: &'a Plan,
-    reference: Reference<'a>,
+    executor: Executor<'a>,
     flicker: Option<f64>,
     ms: Times,
     shadowed: Shadowed,
@@ -74,10 +75,15 @@ struct Picture {
 
 impl<'a> Stage<'a> {
     /// `opaque`: alpha-masked materials cast and show as solid.
-    pub(crate) fn new(scene: &'a Scene, opaque: bool, fit: args::Fit) -> Result<Self> {
-        let tracer = Tracer::new(scene)?.opaque(opaque);
-        let receivers = Receivers::new(scene, &tracer, fit);
-        Ok(Self { scene, tracer, receivers, opaque })
+    pub(crate) fn new(
+        scene: &'a Scene,
+        execution: &'a Execution,
+        opaque: bool,
+        fit: args::Fit,
+    ) -> Result<Self> {
+        let sets = Sets::new(scene, execution, opaque)?;
+        let receivers = Receivers::new(scene, &sets.tracer, fit);
+        Ok(Self { scene, execution, sets, receivers, opaque })
     }
 
     /// What readers of a report should know.
@@ -101,7 +107,7 @@ impl<'a> Comparison<'a> {
     ) -> Result<Self> {
         let onlooker = onlooker(view, Some(stage.scene))?;
         let lamp = lamp(light, Some(stage.scene))?;
-        let view = View::new(&stage.tracer, onlooker.camera, lamp.light, options.samples)
+        let view = View::new(&stage.sets.tracer, onlooker.camera, lamp.light, options.samples)
             .context("--samples")?;
         let bounds = stage.receivers.bounds();
         let plan = |t| pixels::plan(t, &onlooker.camera, &lamp.light, &bounds);
@@ -121,7 +127,7 @@ impl<'a> Comparison<'a> {
     /// Rows of rays and of measuring that there are to do.
     pub(crate) fn rows(&self) -> u64 {
         let plans = self.plans.iter().zip(&self.options.shadows);
-        let rows_of_maps: u64 = plans.map(|((plan, _), t)| Reference::rows(plan, t.filter)).sum();
+        let rows_of_maps: u64 = plans.map(|((plan, _), t)| self.stage.sets.rows(plan, t)).sum();
         // Of the picture: what is seen, the truth; each technique's lookups and measuring.
         rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
     }
@@ -131,23 +137,20 @@ impl<'a> Comparison<'a> {
         let mut contenders = Vec::new();
         for (technique, (plan, ms)) in self.options.shadows.iter().zip(&self.plans) {
             progress.stage(format!("{}: shadow map", technique.spec));
+            let mut executor = self.stage.sets.executor(technique)?;
             let start = Instant::now();
-            let reference =
-                Reference::render(&self.stage.tracer, plan, technique.filter, &|rows| {
-                    progress.advance(rows);
-                })?;
+            executor.render(plan, &|rows| progress.advance(rows))?;
             contenders.push(Contender {
                 technique,
-                backend: self.options.execution.executor(),
                 plan,
-                reference,
+                executor,
                 flicker: None,
                 ms: Times { plan: Some(*ms), depth: Some(milliseconds(start)), ..Times::default() },
                 shadowed: Shadowed::default(),
                 texels: Texels::default(),
             });
         }
-        let truth = trace(&self.view, &mut contenders, progress);
+        let truth = trace(&self.view, &mut contenders, progress)?;
         Ok(Compared { comparison: self, truth, contenders, motion: None })
     }
 }
@@ -167,7 +170,7 @@ impl Compared<'_> {
     ) -> Result<()> {
         let Comparison { stage, options, onlooker, lamp, .. } = self.comparison;
         let scenery = Scenery {
-            tracer: &stage.tracer,
+            sets: &stage.sets,
             bounds: &stage.receivers.bounds(),
             look: onlooker.look,
             light: lamp.light,
@@ -194,7 +197,8 @@ impl Compared<'_> {
             SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
         let truth_pictures = write_truth_pictures(folder, &seen)?;
         let finished = self.contenders.into_par_iter().enumerate().map(|(i, contender)| {
-            let finished = contender.finish(i + 1, folder, &seen, stage.scene);
+            let device = stage.execution.device();
+            let finished = contender.finish(i + 1, folder, &seen, stage.scene, device);
             progress.advance(self.comparison.height());
             finished
         });
@@ -226,27 +230,31 @@ impl Compared<'_> {
 
 /// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that all
 /// share what the camera sees.
-fn trace(view: &View<'_>, contenders: &mut [Contender<'_>], progress: &Progress) -> TruthSoFar {
+fn trace(
+    view: &View<'_>,
+    contenders: &mut [Contender<'_>],
+    progress: &Progress,
+) -> Result<TruthSoFar> {
     let advance = |rows| progress.advance(rows);
     let mut truth = TruthSoFar::default();
-    for rows in view.bands() {
+    for range in view.bands() {
         progress.stage("ray-traced truth");
         let start = Instant::now();
-        let band = view.band(rows, &advance);
-        let visibility = band.map(|s| view.truth(s), &advance);
+        let rows = Rows::new(view, range.clone(), &advance);
+        let strip = rows.truth();
         truth.seconds += start.elapsed().as_secs_f64();
-        truth.counted.extend(counted(view, &band));
-        truth.shadowed.push(view, &band, &visibility);
+        truth.counted.extend(strip.counted());
+        truth.shadowed.push(&strip);
         for contender in contenders.iter_mut() {
             progress.stage(format!("{}: picture", contender.technique.spec));
             let start = Instant::now();
-            let visibility = band.map(|s| contender.reference.visibility(0, s), &advance);
+            let strip = contender.executor.strip(&rows)?;
             *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
-            contender.shadowed.push(view, &band, &visibility);
-            contender.texels.push(view, &band, contender.plan, &contender.reference);
+            contender.shadowed.push(&strip);
+            contender.texels.push(&strip);
         }
     }
-    truth
+    Ok(truth)
 }
 
 impl Contender<'_> {
@@ -257,6 +265,7 @@ impl Contender<'_> {
         folder: &Path,
         truth: &SeenTruth<'_>,
         scene: &Scene,
+        device: Option<String>,
     ) -> Result<(Measured, Pictures)> {
         let size = truth.visibility.size();
         let picture = Picture::new(size, self.shadowed)?;
@@ -280,7 +289,8 @@ impl Contender<'_> {
             write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
         let measured = Measured {
             shadows,
-            backend: self.backend.into(),
+            backend: self.executor.name().into(),
+            device: device.filter(|_| self.executor.is_gpu()),
             maps: self.plan.maps.len() as u32,
             texels: self.plan.texels(),
             metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,

@@ -5,6 +5,7 @@
 mod args;
 mod compare;
 mod comparison;
+mod execute;
 mod figures;
 mod motion;
 mod output;

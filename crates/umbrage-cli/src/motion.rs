@@ -1,14 +1,14 @@
 //! Flicker: shadows that change from frame to frame where the truth does not.
 
+use crate::execute::{Executor, Sets};
 use crate::pixels;
 use crate::progress::Progress;
 use crate::spec::Technique;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 use glam::{DQuat, DVec3};
-use rayon::prelude::*;
 use umbrage::{Bounds, Camera, Light, LookAt, Plan};
-use umbrage_trace::{Reference, Sample, Tracer, View};
+use umbrage_trace::{Sample, View};
 
 /// A motion, in steps as small as between the frames of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -23,7 +23,7 @@ pub(crate) enum Motion {
 
 /// What moves, through what.
 pub(crate) struct Scenery<'a> {
-    pub(crate) tracer: &'a Tracer<'a>,
+    pub(crate) sets: &'a Sets<'a>,
     pub(crate) bounds: &'a Bounds<'a>,
     pub(crate) look: LookAt,
     pub(crate) light: Light,
@@ -97,10 +97,10 @@ pub(crate) fn flicker(
     techniques: &[Technique],
     progress: &Progress,
 ) -> Result<Vec<Option<f64>>> {
-    let Scenery { tracer, bounds, look, light, samples } = *scenery;
+    let Scenery { sets, bounds, look, light, samples } = *scenery;
     let frames = (0..frames).map(|i| {
         let (camera, light) = motion.frame(look, light, i)?;
-        let view = View::new(tracer, camera, light, samples).context("--samples")?;
+        let view = View::new(&sets.tracer, camera, light, samples).context("--samples")?;
         let plan = |t| pixels::plan(t, &camera, &light, bounds).map(|(plan, _)| plan);
         let plans = techniques.iter().map(plan).collect::<Result<_>>()?;
         Ok(Frame { view, plans })
@@ -108,31 +108,29 @@ pub(crate) fn flicker(
     let frames: Vec<Frame<'_>> = frames.collect::<Result<_>>()?;
     let mut change = vec![0f64; techniques.len()];
     let mut compared = 0u64;
-    let mut before: Option<(&View<'_>, Vec<Reference<'_>>)> = None;
+    let executors = || techniques.iter().map(|t| sets.executor(t)).collect::<Result<Vec<_>>>();
+    let [mut now, mut last]: [Vec<Executor<'_>>; 2] = [executors()?, executors()?];
+    let mut before: Option<&View<'_>> = None;
     for (i, frame) in frames.iter().enumerate() {
         progress.stage(format!("motion: frame {} of {}", i + 1, frames.len()));
-        let render = |(technique, plan): (&Technique, _)| {
-            Ok(Reference::render(tracer, plan, technique.filter, &|_| {})?)
-        };
-        let now = techniques.iter().zip(&frame.plans).map(render).collect::<Result<Vec<_>>>()?;
-        if let Some((last_view, last)) = &before {
-            for rows in frame.view.bands() {
-                let band = frame.view.band(rows, &|_| {});
-                let steady = band.map(|s| steady(s, &frame.view, last_view), &|_| {});
-                let steady: Vec<[Sample; 2]> = steady.into_iter().flatten().collect();
-                compared += steady.len() as u64;
-                for ((change, now), last) in change.iter_mut().zip(&now).zip(last) {
-                    let of = |[s, was]: &[Sample; 2]| {
-                        (now.visibility(0, s) - last.visibility(0, was)).abs()
-                    };
-                    // Summed up in one order, whatever the number of threads.
-                    let changes: Vec<f32> = steady.par_iter().map(of).collect();
-                    *change += changes.into_iter().map(f64::from).sum::<f64>();
-                }
+        for (executor, plan) in now.iter_mut().zip(&frame.plans) {
+            executor.render(plan, &|_| {})?;
+        }
+        let bands = before.into_iter().flat_map(|last| frame.view.bands().map(move |b| (last, b)));
+        for (last_view, rows) in bands {
+            let band = frame.view.band(rows, &|_| {});
+            let steady = band.map(|s| steady(s, &frame.view, last_view), &|_| {});
+            let steady: Vec<[Sample; 2]> = steady.into_iter().flatten().collect();
+            compared += steady.len() as u64;
+            let [is, was] = [0, 1].map(|i| steady.iter().map(|s| &s[i]).collect::<Vec<_>>());
+            for ((change, now), last) in change.iter_mut().zip(&mut now).zip(&mut last) {
+                let [is, was] = [now.visibility(&is)?, last.visibility(&was)?];
+                *change += is.iter().zip(was).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
             }
         }
         progress.advance(u64::from(look.image[1]));
-        before = Some((&frame.view, now));
+        before = Some(&frame.view);
+        std::mem::swap(&mut now, &mut last);
     }
     Ok(change.iter().map(|sum| (compared > 0).then(|| sum / compared as f64)).collect())
 }

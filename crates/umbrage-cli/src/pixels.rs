@@ -1,54 +1,74 @@
-//! From samples to pixels: pictures that grow band by band, from the top.
+//! From samples to pixels: pictures that grow strip by strip, from the top.
 
 use crate::spec::Technique;
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
+use std::cell::OnceCell;
+use std::ops::Range;
 use std::time::Instant;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, ShadowMap};
 use umbrage_measure::Rgb;
 use umbrage_scene::Scene;
-use umbrage_trace::{Band, Reference, Sample, View, shade};
+use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
 
-/// What to say of a picture none of whose pixels [count](counted).
+/// What to say of a picture none of whose pixels counts.
 pub(crate) const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
      the view's range: there are no shadows to see";
 
-/// What shadows look like, whoever made them.
-#[derive(Default)]
-pub(crate) struct Shadowed {
-    /// The shaded picture.
-    pub(crate) color: Vec<Rgb>,
-    /// 0 (in shadow) ..= 1 (lit). Over the samples that count, if there are any in a pixel; else over
-    /// all, the sky being lit.
-    pub(crate) visibility: Vec<f32>,
+/// Some of a picture's rows, and what the CPU sees there, which is found when it is first asked for.
+pub(crate) struct Rows<'a> {
+    pub(crate) view: &'a View<'a>,
+    pub(crate) range: Range<u32>,
+    progress: Progress<'a>,
+    band: OnceCell<Band>,
 }
 
-impl Shadowed {
-    /// Adds a band, with one visibility a sample.
-    pub(crate) fn push(&mut self, view: &View<'_>, band: &Band, visibility: &[f32]) {
-        self.color.extend(shade::picture(view, band, visibility));
-        let counted = band.means_facing(visibility, view.camera().far());
-        let pixels = per_pixel(band, visibility).zip(counted);
-        self.visibility.extend(pixels.map(|((samples, values), counted)| {
-            counted.unwrap_or_else(|| {
-                let value = |(s, v): (&Option<Sample>, &f32)| s.map_or(1.0, |_| *v);
-                samples.iter().zip(values).map(value).sum::<f32>() / values.len() as f32
-            })
-        }));
+impl<'a> Rows<'a> {
+    pub(crate) fn new(view: &'a View<'a>, range: Range<u32>, progress: Progress<'a>) -> Self {
+        Self { view, range, progress, band: OnceCell::new() }
+    }
+
+    /// The surfaces that rays find.
+    pub(crate) fn band(&self) -> &Band {
+        self.band.get_or_init(|| self.view.band(self.range.clone(), self.progress))
+    }
+
+    /// The truth.
+    pub(crate) fn truth(&self) -> Strip {
+        let band = self.band();
+        Strip::new(self.view, band, band.map(|s| self.view.truth(s), self.progress))
+    }
+
+    /// Nothing casts.
+    pub(crate) fn in_full_light(&self) -> Strip {
+        let band = self.band();
+        Strip::new(self.view, band, vec![1.0; band.samples().len()])
+    }
+
+    /// What the reference's maps let through.
+    pub(crate) fn by_reference(&self, plan: &Plan, reference: &Reference<'_>) -> Strip {
+        let band = self.band();
+        let visibility = band.map(|s| reference.visibility(0, s), self.progress);
+        let lookup = |s: &Sample| Lookup::of(plan, reference, self.view.camera(), s);
+        Strip { lookups: band.map(lookup, &|_| {}), ..Strip::new(self.view, band, visibility) }
     }
 }
 
-/// Where a map's texels lie on what is seen.
-#[derive(Default)]
-pub(crate) struct Texels {
-    /// Pixels per texel in the worst direction, the mean over the samples that count; NaN where none
-    /// does or no map serves it.
-    pub(crate) error: Vec<f32>,
-    /// Texel coordinates s and t in the middle of the pixel; NaN where no map serves it.
-    pub(crate) texel: Vec<[f32; 2]>,
-    /// Index of the map that serves the middle of the pixel.
-    pub(crate) map: Vec<Option<u16>>,
+/// What some rows of a picture show, a value a sample, whoever found it: pixel after pixel.
+pub(crate) struct Strip {
+    samples_per_pixel: usize,
+    radiance: Vec<Vec3>,
+    /// 1 in the sky.
+    visibility: Vec<f32>,
+    /// Whether a surface is seen that faces the light, within the view's range.
+    counts: Vec<bool>,
+    /// Metres; infinite in the sky.
+    depth: Vec<f32>,
+    /// World space; zero in the sky.
+    normal: Vec<Vec3>,
+    /// Empty for the truth, which has no maps.
+    lookups: Vec<Lookup>,
 }
 
 /// What a plan has for a sample.
@@ -81,68 +101,132 @@ impl Lookup {
     }
 }
 
+impl Strip {
+    fn new(view: &View<'_>, band: &Band, visibility: Vec<f32>) -> Self {
+        let samples = || band.samples().iter().map(Option::as_ref);
+        let far = view.camera().far();
+        Self {
+            samples_per_pixel: band.samples_per_pixel(),
+            radiance: shade::radiances(view, band, &visibility),
+            counts: samples().map(|s| s.is_some_and(|s| s.is_facing && s.depth <= far)).collect(),
+            depth: samples().map(|s| s.map_or(f32::INFINITY, |s| s.depth as f32)).collect(),
+            normal: samples()
+                .map(|s| s.map_or(Vec3::ZERO, |s| s.surface.shading_normal.as_vec3()))
+                .collect(),
+            visibility: samples().zip(visibility).map(|(s, v)| s.map_or(1.0, |_| v)).collect(),
+            lookups: Vec::new(),
+        }
+    }
+
+    /// What a GPU drew.
+    pub(crate) fn of_gpu(samples: &[umbrage_render::Sample], grid: u32, camera: &Camera) -> Self {
+        type Drawn = umbrage_render::Sample;
+        let counts = |s: &Drawn| s.is_facing && f64::from(s.depth) <= camera.far();
+        let lookup = |s: &Drawn| Lookup {
+            error: s.error,
+            texel: s.texel.to_array(),
+            map: s.map.and_then(|m| u16::try_from(m).ok()),
+        };
+        Self {
+            samples_per_pixel: (grid * grid) as usize,
+            radiance: samples.iter().map(|s| s.radiance).collect(),
+            visibility: samples.iter().map(|s| s.visibility).collect(),
+            counts: samples.iter().map(counts).collect(),
+            depth: samples.iter().map(|s| s.depth).collect(),
+            normal: samples.iter().map(|s| s.normal).collect(),
+            lookups: samples.iter().map(lookup).collect(),
+        }
+    }
+
+    /// For each pixel the mean of a value over the samples that count; `None` where none does.
+    fn means(&self, value: impl Fn(usize) -> f32) -> impl Iterator<Item = Option<f32>> {
+        let n = self.samples_per_pixel;
+        self.counts.chunks(n).enumerate().map(move |(pixel, counts)| {
+            let counted = counts.iter().enumerate().filter(|(_, counts)| **counts);
+            let values = counted.map(|(i, _)| value(pixel * n + i));
+            let (sum, count) = values.fold((0.0, 0u32), |(sum, n), v| (sum + v, n + 1));
+            (count > 0).then(|| sum / count as f32)
+        })
+    }
+
+    /// Whether each pixel counts: any of its samples does.
+    pub(crate) fn counted(&self) -> impl Iterator<Item = bool> {
+        self.counts.chunks(self.samples_per_pixel).map(|counts| counts.contains(&true))
+    }
+
+    /// A value of the sample in the middle of each pixel, or next to it.
+    fn middles<'a, T>(&self, values: &'a [T]) -> impl Iterator<Item = &'a T> {
+        let grid = self.samples_per_pixel.isqrt();
+        let middle = grid / 2 * grid + grid / 2;
+        values.iter().skip(middle).step_by(self.samples_per_pixel)
+    }
+}
+
+/// What shadows look like, whoever made them.
+#[derive(Default)]
+pub(crate) struct Shadowed {
+    /// The shaded picture.
+    pub(crate) color: Vec<Rgb>,
+    /// 0 (in shadow) ..= 1 (lit). Over the samples that count, if there are any in a pixel; else over
+    /// all, the sky being lit.
+    pub(crate) visibility: Vec<f32>,
+}
+
+impl Shadowed {
+    /// Adds a strip.
+    pub(crate) fn push(&mut self, strip: &Strip) {
+        let n = strip.samples_per_pixel;
+        self.color.extend(shade::pixels(&strip.radiance, n));
+        let of_all = strip.visibility.chunks(n).map(|v| v.iter().sum::<f32>() / n as f32);
+        let counted = strip.means(|i| strip.visibility[i]);
+        self.visibility.extend(counted.zip(of_all).map(|(counted, all)| counted.unwrap_or(all)));
+    }
+}
+
+/// Where a map's texels lie on what is seen.
+#[derive(Default)]
+pub(crate) struct Texels {
+    /// Pixels per texel in the worst direction, the mean over the samples that count; NaN where none
+    /// does or no map serves it.
+    pub(crate) error: Vec<f32>,
+    /// Texel coordinates s and t in the middle of the pixel; NaN where no map serves it.
+    pub(crate) texel: Vec<[f32; 2]>,
+    /// Index of the map that serves the middle of the pixel.
+    pub(crate) map: Vec<Option<u16>>,
+}
+
 impl Texels {
-    /// Adds a band as seen through `plan`'s maps.
-    pub(crate) fn push(
-        &mut self,
-        view: &View<'_>,
-        band: &Band,
-        plan: &Plan,
-        reference: &Reference<'_>,
-    ) {
-        let lookups = band.map(|s| Lookup::of(plan, reference, view.camera(), s), &|_| {});
-        let errors: Vec<f32> = lookups.iter().map(|l| l.error).collect();
-        let means = band.means_facing(&errors, view.camera().far());
-        self.error.extend(means.into_iter().map(|m| m.unwrap_or(f32::NAN)));
-        for (_, lookups) in per_pixel(band, &lookups) {
-            let middle = lookups[middle(band)];
+    /// Adds a strip.
+    pub(crate) fn push(&mut self, strip: &Strip) {
+        let means = strip.means(|i| strip.lookups[i].error);
+        self.error.extend(means.map(|m| m.unwrap_or(f32::NAN)));
+        for middle in strip.middles(&strip.lookups) {
             self.texel.push(middle.texel);
             self.map.push(middle.map);
         }
     }
 }
 
-/// Whether each pixel of the band shows a surface that faces the light, within the view's range.
-pub(crate) fn counted(view: &View<'_>, band: &Band) -> impl Iterator<Item = bool> {
-    let zeros = vec![0.0; band.samples().len()];
-    band.means_facing(&zeros, view.camera().far()).into_iter().map(|m| m.is_some())
+/// What is seen, apart from its shadows.
+#[derive(Default)]
+pub(crate) struct Shape {
+    /// Linear colour of each pixel: red, green, blue.
+    pub(crate) radiance: Vec<[f32; 3]>,
+    /// In the middle of each pixel, metres; infinite in the sky.
+    pub(crate) depth: Vec<f32>,
+    /// In the middle of each pixel, world space; zero in the sky.
+    pub(crate) normal: Vec<Vec3>,
 }
 
-/// The sample in the middle of each pixel.
-pub(crate) fn middles(band: &Band) -> impl Iterator<Item = Option<&Sample>> {
-    band.samples().chunks(band.samples_per_pixel()).map(|samples| samples[middle(band)].as_ref())
-}
-
-/// Linear colour of each pixel: red, green, blue.
-pub(crate) fn linear_color(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<[f32; 3]> {
-    let width = view.camera().image()[0] as usize;
-    let pixels = per_pixel(band, visibility).enumerate();
-    let colors = pixels.map(|(i, (samples, values))| {
-        let row = f64::from(band.rows().start) + (i / width) as f64;
-        let center = glam::DVec2::new((i % width) as f64, row) + 0.5;
-        let radiance = samples.iter().zip(values).map(|(sample, &visibility)| match sample {
-            Some(s) => shade::radiance(view.light(), s, visibility),
-            None => shade::sky(view.light(), view.camera(), center),
-        });
-        (radiance.sum::<Vec3>() / values.len() as f32).to_array()
-    });
-    colors.collect()
-}
-
-/// Samples and their values, pixel by pixel.
-fn per_pixel<'a, T>(
-    band: &'a Band,
-    values: &'a [T],
-) -> impl Iterator<Item = (&'a [Option<Sample>], &'a [T])> {
-    let n = band.samples_per_pixel();
-    band.samples().chunks(n).zip(values.chunks(n))
-}
-
-/// Index of the sample in the middle of a pixel, or next to it.
-fn middle(band: &Band) -> usize {
-    let n = band.samples_per_pixel();
-    let grid = n.isqrt();
-    grid / 2 * grid + grid / 2
+impl Shape {
+    /// Adds a strip.
+    pub(crate) fn push(&mut self, strip: &Strip) {
+        let n = strip.samples_per_pixel;
+        let pixels = strip.radiance.chunks(n);
+        self.radiance.extend(pixels.map(|p| (p.iter().sum::<Vec3>() / n as f32).to_array()));
+        self.depth.extend(strip.middles(&strip.depth));
+        self.normal.extend(strip.middles(&strip.normal));
+    }
 }
 
 /// A technique's plan, and how long planning takes, milliseconds, once buffers have grown.

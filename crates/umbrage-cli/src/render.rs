@@ -1,18 +1,18 @@
 //! `umbrage render`: one picture.
 
 use crate::args::{self, Aov, PictureKind};
+use crate::execute::{Execution, Sets};
 use crate::output::{check_file, note};
-use crate::pixels::{self, NOTHING_TO_SHADOW, Shadowed, Texels, counted, linear_color, middles};
+use crate::pixels::{self, NOTHING_TO_SHADOW, Rows, Shadowed, Shape, Texels};
 use crate::progress::Progress;
 use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
-use glam::DVec3;
 use umbrage::Size;
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, partition_map, texel_map, write_exr,
     write_png,
 };
-use umbrage_trace::{Reference, Tracer, View, shade};
+use umbrage_trace::{View, shade};
 
 /// Everything that pictures are made of; what the picture asked for does not need stays empty.
 #[derive(Default)]
@@ -21,12 +21,7 @@ struct Layers {
     truth: Shadowed,
     technique: Shadowed,
     texels: Texels,
-    /// Linear colours.
-    color: Vec<[f32; 3]>,
-    /// Metres; infinite for the sky.
-    depth: Vec<f32>,
-    /// World space; zero for the sky.
-    normal: Vec<DVec3>,
+    shape: Shape,
 }
 
 /// Renders, and writes the picture.
@@ -36,19 +31,19 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let scene = open_scene(&args.scene.name)?;
     let camera = onlooker(&args.view, Some(&scene))?.camera;
     let light = lamp(&args.light, Some(&scene))?.light;
-    let tracer = Tracer::new(&scene)?.opaque(args.scene.opaque);
-    let view = View::new(&tracer, camera, light, args.samples).context("--samples")?;
-    let receivers = Receivers::new(&scene, &tracer, args.fit);
+    let execution = Execution::open(&args.execution, std::slice::from_ref(&args.shadows))?;
+    let sets = Sets::new(&scene, &execution, args.scene.opaque)?;
+    let view = View::new(&sets.tracer, camera, light, args.samples).context("--samples")?;
+    let receivers = Receivers::new(&scene, &sets.tracer, args.fit);
     let (plan, _) = pixels::plan(&args.shadows, &camera, &light, &receivers.bounds())?;
 
     let needs_truth = matches!(args.aov, Aov::Truth | Aov::Difference);
     let needs_map = !matches!(args.aov, Aov::Truth | Aov::Depth | Aov::Normal);
     let height = u64::from(camera.image()[1]);
-    let filter = args.shadows.filter;
-    let map_rows = if needs_map { Reference::rows(&plan, filter) } else { 0 };
+    let map_rows = if needs_map { sets.rows(&plan, &args.shadows) } else { 0 };
     let passes = 1 + u64::from(needs_truth) + u64::from(needs_map);
     tell_notices(&scene);
-    args.execution.announce();
+    execution.announce();
     if let Size::MaxError(pixels) = args.shadows.options.size
         && needs_map
     {
@@ -57,33 +52,31 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let progress = Progress::new(map_rows + height * passes, quiet);
     let advance = |rows| progress.advance(rows);
 
-    let reference = if needs_map {
+    let mut executor = sets.executor(&args.shadows)?;
+    if needs_map {
         progress.stage("shadow map");
-        Some(Reference::render(&tracer, &plan, filter, &advance)?)
-    } else {
-        None
-    };
+        executor.render(&plan, &advance)?;
+    }
     progress.stage("picture");
     let mut layers = Layers::default();
-    for rows in view.bands() {
-        let band = view.band(rows, &advance);
-        layers.counted.extend(counted(&view, &band));
-        for sample in middles(&band) {
-            layers.depth.push(sample.map_or(f32::INFINITY, |s| s.depth as f32));
-            layers.normal.push(sample.map_or(DVec3::ZERO, |s| s.surface.shading_normal));
+    for range in view.bands() {
+        let rows = Rows::new(&view, range, &advance);
+        let truth = needs_truth.then(|| rows.truth());
+        let strip = if needs_map { Some(executor.strip(&rows)?) } else { None };
+        let shape = match (&truth, &strip) {
+            (Some(truth), _) => truth,
+            (_, Some(strip)) => strip,
+            _ => &executor.shape(&rows)?,
+        };
+        layers.counted.extend(shape.counted());
+        if let Some(truth) = &truth {
+            layers.truth.push(truth);
         }
-        if needs_truth {
-            let truth = band.map(|s| view.truth(s), &advance);
-            layers.truth.push(&view, &band, &truth);
+        if let Some(strip) = &strip {
+            layers.technique.push(strip);
+            layers.texels.push(strip);
         }
-        if let Some(reference) = &reference {
-            let visibility = band.map(|s| reference.visibility(0, s), &advance);
-            layers.technique.push(&view, &band, &visibility);
-            layers.texels.push(&view, &band, &plan, reference);
-            if args.aov == Aov::Color && kind == PictureKind::Exr {
-                layers.color.extend(linear_color(&view, &band, &visibility));
-            }
-        }
+        layers.shape.push(strip.as_ref().unwrap_or(shape));
     }
     drop(progress);
     if (needs_map || needs_truth) && !layers.counted.contains(&true) {
@@ -126,9 +119,12 @@ impl Layers {
             }
             Aov::Depth => {
                 let color = |&d: &f32| shade::depth_color(view.camera(), f64::from(d));
-                rgb(self.depth.iter().map(color).collect())?
+                rgb(self.shape.depth.iter().map(color).collect())?
             }
-            Aov::Normal => rgb(self.normal.iter().map(|&n| shade::normal_color(n)).collect())?,
+            Aov::Normal => {
+                let color = |n: &glam::Vec3| shade::normal_color(n.as_dvec3());
+                rgb(self.shape.normal.iter().map(color).collect())?
+            }
         };
         Ok(write_png(path, &picture)?)
     }
@@ -138,8 +134,8 @@ impl Layers {
         let plane = |values: Vec<f32>| Ok(write_exr(path, &Image::new(size, values)?)?);
         let color = |values: Vec<[f32; 3]>| Ok(write_exr(path, &Image::new(size, values)?)?);
         match args.aov {
-            Aov::Color => color(self.color),
-            Aov::Normal => color(self.normal.iter().map(|n| n.as_vec3().to_array()).collect()),
+            Aov::Color => color(self.shape.radiance),
+            Aov::Normal => color(self.shape.normal.iter().map(|n| n.to_array()).collect()),
             Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
             Aov::Visibility => plane(self.technique.visibility),
             Aov::Truth => plane(self.truth.visibility),
@@ -153,7 +149,7 @@ impl Layers {
                 )
             }
             Aov::Error => plane(self.texels.error),
-            Aov::Depth => plane(self.depth),
+            Aov::Depth => plane(self.shape.depth),
             Aov::Partition => {
                 plane(self.texels.map.iter().map(|m| m.map_or(-1.0, f32::from)).collect())
             }

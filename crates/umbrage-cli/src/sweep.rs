@@ -6,6 +6,7 @@ mod views;
 
 use crate::args;
 use crate::comparison::{Comparison, Stage};
+use crate::execute::Execution;
 use crate::output::{ReportFolder, aligned, command_line, note, one_line, print};
 use crate::pixels::NOTHING_TO_SHADOW;
 use crate::progress::Progress;
@@ -33,6 +34,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
     if let Some(scenes) = &args.scenes {
         ensure!(scenes.is_dir(), "--scenes: {} is not a folder", scenes.display());
     }
+    let execution = Execution::open(&args.comparison.execution, &args.comparison.shadows)?;
     let settings = SweepSettings {
         shadows: args.comparison.shadows.iter().map(|t| t.spec.to_string()).collect(),
         max_error: args.comparison.texels.max_error,
@@ -40,7 +42,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
         samples: args.comparison.samples,
         opaque: args.opaque,
         fit: args.comparison.fit.name().into(),
-        backend: args.comparison.execution.executor().into(),
+        backend: execution.name().into(),
     };
     let folder = if args.merge.is_empty() {
         let folder = SweepFolder::open(&args.output, &settings)?;
@@ -50,7 +52,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
                 |share: u32| (views.len() as u64 * u64::from(share) / u64::from(count)) as usize;
             views = views[first(index - 1)..first(index)].to_vec();
         }
-        compare_missing(args, &folder, &views, &settings, quiet)?;
+        compare_missing(args, &execution, &folder, &views, &settings, quiet)?;
         folder
     } else {
         join(args, &views, &settings)?
@@ -111,6 +113,7 @@ fn check_names(folder: &SweepFolder, args: &args::Sweep, views: &[View]) -> Resu
 /// Compares the views that the folder has no result of, one that failed being none.
 fn compare_missing(
     args: &args::Sweep,
+    execution: &Execution,
     folder: &SweepFolder,
     views: &[View],
     settings: &SweepSettings,
@@ -140,7 +143,7 @@ fn compare_missing(
         note(&format!("{done} of {} views are done already", views.len()));
     }
     folder.remove_tables()?;
-    args.comparison.execution.announce();
+    execution.announce();
     let progress = Progress::of_parts(pending.len() as u64, quiet);
     let mut number = done;
     for pending in pending.chunk_by(|a, b| a.inputs.view.scene == b.inputs.view.scene) {
@@ -151,7 +154,7 @@ fn compare_missing(
         let stage = scene
             .as_ref()
             .map_err(again)
-            .and_then(|s| Stage::new(s, args.opaque, args.comparison.fit));
+            .and_then(|s| Stage::new(s, execution, args.opaque, args.comparison.fit));
         for view in pending {
             number += 1;
             progress.name(format!("{number}/{} {}", views.len(), view.inputs.view.name));

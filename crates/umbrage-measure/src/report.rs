@@ -105,8 +105,11 @@ pub struct Motion {
 pub struct Measured {
     /// The shadow specification, e.g. `lispsm@1024`.
     pub shadows: String,
-    /// What executed the plan: `reference` or a GPU's name.
+    /// What executed the plan: `reference` or `gpu`.
     pub backend: String,
+    /// The GPU's name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// Number of shadow maps.
     pub maps: u32,
     /// Texels of all maps together.
@@ -178,6 +181,7 @@ pub(crate) mod tests {
         let result = |(i, &wrong): (usize, &Option<f64>)| Measured {
             shadows: format!("lambda={i}@1024"),
             backend: "reference".to_owned(),
+            device: None,
             maps: 1,
             texels: 1 << 40,
             metrics: Metrics {

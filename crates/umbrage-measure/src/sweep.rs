@@ -273,6 +273,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         let Measured {
             shadows,
             backend,
+            device: _,
             maps,
             texels,
             metrics,

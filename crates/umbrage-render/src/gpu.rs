@@ -49,22 +49,27 @@ fn is_software(info: &AdapterInfo) -> bool {
     info.device_type == DeviceType::Cpu
 }
 
-/// All adapters, the best first: real GPUs before software, Vulkan, Metal and Direct3D before OpenGL.
+/// All adapters, the best first: real GPUs before software.
 fn adapters() -> Vec<Adapter> {
-    let descriptor =
-        InstanceDescriptor { backends: Backends::all(), ..InstanceDescriptor::new_without_display_handle() };
-    let instance = Instance::new(descriptor.with_env());
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
-    adapters.sort_by_key(|a| {
-        let info = a.get_info();
-        let kind = match info.device_type {
-            DeviceType::DiscreteGpu => 0,
-            DeviceType::IntegratedGpu => 1,
-            DeviceType::VirtualGpu => 2,
-            DeviceType::Other => 3,
-            DeviceType::Cpu => 4,
-        };
-        (kind, info.backend == wgpu::Backend::Gl)
+    let backends = Backends::from_env().unwrap_or(Backends::all());
+    // OpenGL is the last resort, and looking for it alone makes some drivers print.
+    let primary = adapters_of(backends & Backends::PRIMARY);
+    if primary.is_empty() { adapters_of(backends & Backends::SECONDARY) } else { primary }
+}
+
+fn adapters_of(backends: Backends) -> Vec<Adapter> {
+    if backends.is_empty() {
+        return Vec::new();
+    }
+    let descriptor = InstanceDescriptor::new_without_display_handle_from_env();
+    let instance = Instance::new(InstanceDescriptor { backends, ..descriptor });
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
+    adapters.sort_by_key(|a| match a.get_info().device_type {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Other => 3,
+        DeviceType::Cpu => 4,
     });
     adapters
 }
@@ -170,6 +175,18 @@ impl Gpu {
         let polled = self.device.poll(PollType::wait_indefinitely());
         self.check()?;
         polled.map(drop).map_err(|e| Error::Lost(e.to_string()))
+    }
+
+    /// What is in a buffer that can be mapped, once all that was submitted is done.
+    pub(crate) fn read<T: bytemuck::Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, Error> {
+        // The callback tells nothing that waiting does not.
+        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.wait()?;
+        let bytes = buffer.get_mapped_range(..).map_err(|e| Error::Lost(e.to_string()))?;
+        let values = bytemuck::pod_collect_to_vec(&bytes);
+        drop(bytes);
+        buffer.unmap();
+        Ok(values)
     }
 
     /// Tells what went wrong on the device since it was last asked.

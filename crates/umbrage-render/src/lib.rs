@@ -4,15 +4,10 @@
 //! - [`Gpu`] is a device without a window; [`devices`] tells of all there are.
 //! - [`SceneBuffers`] are a scene's meshes and materials on it.
 //! - [`Renderer`] draws a plan's maps, then [frames](Renderer::frame) to look at or [samples](Renderer::samples) to measure.
-//!
-//! ```no_run
-//! use umbrage::{Bounds, Casters, Options, Planner};
-//! # use umbrage_render::*;
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> { Ok(()) }
-//! ```
 
 mod error;
 mod gpu;
+mod points;
 mod renderer;
 mod samples;
 mod scene;
@@ -24,4 +19,4 @@ pub use gpu::{AdapterReport, Gpu, devices};
 pub use renderer::{Drawn, FRAME_FORMAT, Look, Renderer};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
-pub use timer::{Stage, Timer};
+pub use timer::Timer;

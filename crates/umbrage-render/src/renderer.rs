@@ -1,3 +1,4 @@
+use crate::points::Points;
 use crate::scene::{Attributes, SceneBuffers};
 use crate::timer::Timer;
 use crate::view::{Tile, ViewUniform};
@@ -26,7 +27,8 @@ use wgpu::{
 pub struct Renderer<'g, 's> {
     pub(crate) gpu: &'g Gpu,
     scene: &'g SceneBuffers<'s>,
-    shadows: Shadows,
+    pub(crate) shadows: Shadows,
+    pub(crate) points: Option<Points>,
     opaque: MeshCasters,
     masked: MeshCasters,
     /// One a material; `None` for opaque ones.
@@ -254,6 +256,7 @@ impl<'g, 's> Renderer<'g, 's> {
             gpu,
             scene,
             shadows,
+            points: None,
             opaque,
             masked,
             masks,

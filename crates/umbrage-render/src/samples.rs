@@ -8,7 +8,7 @@ use std::ops::Range;
 use umbrage_wgpu::DEPTH_FORMAT;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Extent3d,
-    MapMode, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor,
+    TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor,
     TextureDimension, TextureFormat, TextureUsages, TextureViewDescriptor,
 };
 
@@ -159,7 +159,7 @@ impl Layers {
             self.copy(&mut encoder, 0, 2);
         }
         renderer.gpu.queue().submit([encoder.finish()]);
-        let data = self.read(renderer.gpu)?;
+        let data: Vec<Vec4> = renderer.gpu.read(&self.readback)?;
         let layer = self.bytes as usize / size_of::<Vec4>();
         let row = self.bytes_per_row as usize / size_of::<Vec4>();
         let none = Vec4::new(0.0, 0.0, -1.0, 0.0);
@@ -183,16 +183,5 @@ impl Layers {
         };
         let buffer = TexelCopyBufferInfo { buffer: &self.readback, layout };
         encoder.copy_texture_to_buffer(texture.as_image_copy(), buffer, texture.size());
-    }
-
-    fn read(&self, gpu: &Gpu) -> Result<Vec<Vec4>, Error> {
-        self.readback.map_async(MapMode::Read, .., |_| {});
-        gpu.wait()?;
-        let lost = |e: wgpu::MapRangeError| Error::Lost(e.to_string());
-        let bytes = self.readback.get_mapped_range(..).map_err(lost)?;
-        let data = bytemuck::pod_collect_to_vec(&bytes);
-        drop(bytes);
-        self.readback.unmap();
-        Ok(data)
     }
 }

@@ -2,18 +2,9 @@
 
 use crate::{Error, Gpu};
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, MapMode, QuerySet,
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, QuerySet,
     QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
 };
-
-/// A stage of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// Casters into the maps.
-    Depth,
-    /// The scene, with lookups.
-    Shade,
-}
 
 /// Measures one frame at a time.
 pub struct Timer {
@@ -77,12 +68,7 @@ impl Timer {
     /// # Errors
     /// The device's loss.
     pub fn read(&self, gpu: &Gpu) -> Result<[f64; 2], Error> {
-        self.readback.map_async(MapMode::Read, .., |_| {});
-        gpu.wait()?;
-        let range = self.readback.get_mapped_range(..).map_err(|e| Error::Lost(e.to_string()))?;
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&range);
-        drop(range);
-        self.readback.unmap();
+        let ticks: Vec<u64> = gpu.read(&self.readback)?;
         let ms = f64::from(gpu.queue().get_timestamp_period()) * 1e-6;
         let span = |i: usize| ticks[i + 1].saturating_sub(ticks[i]) as f64 * ms;
         Ok([span(0), span(2)])

@@ -65,6 +65,11 @@ impl<'a> View<'a> {
         &self.light
     }
 
+    /// Samples along each side of a pixel.
+    pub fn grid(&self) -> u32 {
+        self.grid
+    }
+
     /// At what.
     pub fn tracer(&self) -> &'a Tracer<'a> {
         self.tracer

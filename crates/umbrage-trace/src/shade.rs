@@ -11,30 +11,36 @@ use umbrage_scene::daylight::{GLOW, GROUND_LIGHT, HORIZON, NADIR, SKY_LIGHT, SUN
 /// # Panics
 /// Unless there is one value a sample.
 pub fn picture(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<[u8; 3]> {
+    pixels(&radiances(view, band, visibility), band.samples_per_pixel())
+}
+
+/// Linear colours of a band's samples, the sky's as well. `visibility` is as for [`picture`].
+///
+/// # Panics
+/// Unless there is one value a sample.
+pub fn radiances(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<Vec3> {
     assert_eq!(visibility.len(), band.samples().len(), "one value a sample");
     let per_pixel = band.samples_per_pixel();
     let width = view.camera().image()[0] as usize;
     let first_row = f64::from(band.rows().start);
-    let pixels = band.samples().chunks(per_pixel).zip(visibility.chunks(per_pixel));
-    pixels
-        .enumerate()
-        .map(|(i, (samples, visibility))| {
-            let sum: Vec3 = samples
-                .iter()
-                .zip(visibility)
-                .map(|(sample, &visibility)| match sample {
-                    Some(s) => radiance(view.light(), s, visibility),
-                    None => {
-                        let corner = DVec2::new((i % width) as f64, (i / width) as f64 + first_row);
-                        sky(view.light(), view.camera(), corner + 0.5)
-                    }
-                })
-                // Compressing before averaging keeps edges against bright sky smooth.
-                .map(compress)
-                .sum();
-            encode(sum / per_pixel as f32)
+    let samples = band.samples().iter().zip(visibility).enumerate();
+    samples
+        .map(|(i, (sample, &visibility))| match sample {
+            Some(s) => radiance(view.light(), s, visibility),
+            None => {
+                let pixel = i / per_pixel;
+                let corner = DVec2::new((pixel % width) as f64, (pixel / width) as f64 + first_row);
+                sky(view.light(), view.camera(), corner + 0.5)
+            }
         })
         .collect()
+}
+
+/// sRGB colours of pixels from the linear ones of their samples, pixel after pixel.
+pub fn pixels(radiances: &[Vec3], samples_per_pixel: usize) -> Vec<[u8; 3]> {
+    let pixels = radiances.chunks(samples_per_pixel.max(1));
+    // Compressing before averaging keeps edges against bright sky smooth.
+    pixels.map(|p| encode(p.iter().copied().map(compress).sum::<Vec3>() / p.len() as f32)).collect()
 }
 
 /// Linear colour of a surface: diffuse, in the light that reaches it, the sky's and the ground's.

@@ -223,6 +223,7 @@ impl Compared {
             results.push(Measured {
                 shadows: name.clone(),
                 backend: "reference".to_owned(),
+                device: None,
                 maps: 1 + u32::from(name.contains("z2")),
                 texels: 1 << 20,
                 metrics: measure(truth.visibility, visibility, counted).unwrap(),

@@ -1,0 +1,200 @@
+//! Who renders shadow maps: a GPU, or the reference on the CPU.
+
+use crate::args::{Backend, ExecutionArgs};
+use crate::output::note;
+use crate::pixels::{Rows, Strip};
+use crate::spec::Technique;
+use anyhow::{Context, Result, anyhow, ensure};
+use rayon::prelude::*;
+use umbrage::{Plan, Warp};
+use umbrage_render::{Gpu, Look, Renderer, SceneBuffers};
+use umbrage_scene::Scene;
+use umbrage_trace::{Progress, Reference, Sample, Tracer};
+use umbrage_wgpu::{Casters, ShadowOptions};
+
+/// What there is to render with.
+pub(crate) struct Execution {
+    gpu: Option<Gpu>,
+    /// What to say of it to whoever left the choice to us.
+    choice: Option<String>,
+}
+
+impl Execution {
+    /// Opens what the arguments ask for.
+    pub(crate) fn open(args: &ExecutionArgs, techniques: &[Technique]) -> Result<Self> {
+        let log = techniques.iter().find(|t| !runs_on_gpu(t));
+        match args.backend {
+            Backend::Reference => Ok(Self { gpu: None, choice: None }),
+            Backend::Gpu => {
+                if let Some(technique) = log {
+                    return Err(anyhow!(
+                        "--backend: no GPU rasterises the rows of `{}`; take reference or auto",
+                        technique.spec
+                    ));
+                }
+                let gpu = Gpu::open().map_err(|e| anyhow!("--backend: {e}; take reference"))?;
+                Ok(Self { gpu: Some(gpu), choice: None })
+            }
+            Backend::Auto if log.is_some() && techniques.len() == 1 => Ok(Self {
+                gpu: None,
+                choice: Some("reference, on the CPU (no GPU rasterises `log`)".to_owned()),
+            }),
+            Backend::Auto => Ok(match Gpu::open() {
+                Ok(gpu) => {
+                    let software = if gpu.is_software() { ", in software" } else { "" };
+                    let log = log.map_or(String::new(), |t| {
+                        format!("; reference for `{}`, which no GPU rasterises", t.spec)
+                    });
+                    let choice = format!("gpu, {}{software}{log}", gpu.info().name);
+                    Self { gpu: Some(gpu), choice: Some(choice) }
+                }
+                Err(e) => Self { gpu: None, choice: Some(format!("reference, on the CPU ({e})")) },
+            }),
+        }
+    }
+
+    /// Says what was chosen, if the choice was ours.
+    pub(crate) fn announce(&self) {
+        if let Some(choice) = &self.choice {
+            note(&format!("backend: {choice}"));
+        }
+    }
+
+    /// The GPU, if there is one.
+    pub(crate) fn gpu(&self) -> Option<&Gpu> {
+        self.gpu.as_ref()
+    }
+
+    /// Name of what renders what can be rendered so.
+    pub(crate) fn name(&self) -> &'static str {
+        if self.gpu.is_some() { GPU } else { REFERENCE }
+    }
+
+    /// The GPU's own name.
+    pub(crate) fn device(&self) -> Option<String> {
+        self.gpu.as_ref().map(|gpu| gpu.info().name.clone())
+    }
+}
+
+const GPU: &str = "gpu";
+const REFERENCE: &str = "reference";
+
+fn runs_on_gpu(technique: &Technique) -> bool {
+    technique.options.warp != Warp::Log
+}
+
+/// A scene where it can be rendered.
+pub(crate) struct Sets<'a> {
+    pub(crate) tracer: Tracer<'a>,
+    gpu: Option<(&'a Gpu, SceneBuffers<'a>)>,
+}
+
+impl<'a> Sets<'a> {
+    /// `opaque`: alpha-masked materials cast and show as solid.
+    pub(crate) fn new(scene: &'a Scene, execution: &'a Execution, opaque: bool) -> Result<Self> {
+        let tracer = Tracer::new(scene)?.opaque(opaque);
+        let buffers = |gpu| SceneBuffers::new(gpu, scene, opaque).context("--backend gpu");
+        let gpu = execution.gpu().map(|gpu| buffers(gpu).map(|b| (gpu, b))).transpose()?;
+        Ok(Self { tracer, gpu })
+    }
+
+    /// Rows that rendering a plan's maps will report.
+    pub(crate) fn rows(&self, plan: &Plan, technique: &Technique) -> u64 {
+        let is_gpu = self.gpu.is_some() && runs_on_gpu(technique);
+        if is_gpu { 0 } else { Reference::rows(plan, technique.filter) }
+    }
+
+    /// Who renders a technique.
+    pub(crate) fn executor(&self, technique: &Technique) -> Result<Executor<'_>> {
+        let filter = technique.filter;
+        match &self.gpu {
+            Some((gpu, buffers)) if runs_on_gpu(technique) => {
+                let options = ShadowOptions { filter, ..ShadowOptions::default() };
+                let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
+                Ok(Executor::Gpu { renderer: Box::new(renderer), gpu, plan: None })
+            }
+            _ => Ok(Executor::Reference { tracer: &self.tracer, technique: technique.clone(), maps: None }),
+        }
+    }
+}
+
+/// Renders a technique's maps and looks them up.
+pub(crate) enum Executor<'a> {
+    Gpu { renderer: Box<Renderer<'a, 'a>>, gpu: &'a Gpu, plan: Option<&'a Plan> },
+    Reference { tracer: &'a Tracer<'a>, technique: Technique, maps: Option<(&'a Plan, Reference<'a>)> },
+}
+
+impl<'a> Executor<'a> {
+    /// `gpu` or `reference`.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Gpu { .. } => GPU,
+            Self::Reference { .. } => REFERENCE,
+        }
+    }
+
+    /// Whether it is a GPU.
+    pub(crate) fn is_gpu(&self) -> bool {
+        matches!(self, Self::Gpu { .. })
+    }
+
+    /// Renders the maps of a plan, in place of those of the one before.
+    pub(crate) fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<()> {
+        match self {
+            Self::Gpu { renderer, gpu, plan } => {
+                renderer.draw_maps(new, Casters::Still, None).context("--backend gpu")?;
+                gpu.wait()?;
+                *plan = Some(new);
+            }
+            Self::Reference { tracer, technique, maps } => {
+                *maps = Some((new, Reference::render(tracer, new, technique.filter, progress)?));
+            }
+        }
+        Ok(())
+    }
+
+    /// What rows of a picture look like. The maps must be rendered.
+    pub(crate) fn strip(&mut self, rows: &Rows<'_>) -> Result<Strip> {
+        match self {
+            Self::Gpu { renderer, .. } => {
+                let (camera, grid) = (rows.view.camera(), rows.view.grid());
+                let look = Look { camera, light: rows.view.light(), light_index: 0 };
+                let samples = renderer.samples(&look, rows.range.clone(), grid, true)?;
+                Ok(Strip::of_gpu(&samples, grid, camera))
+            }
+            Self::Reference { maps, .. } => {
+                let (plan, reference) = maps.as_ref().context("maps are rendered first")?;
+                Ok(rows.by_reference(plan, reference))
+            }
+        }
+    }
+
+    /// What rows of a picture look like without any maps.
+    pub(crate) fn shape(&mut self, rows: &Rows<'_>) -> Result<Strip> {
+        match self {
+            // Maps that there are not let all light through.
+            Self::Gpu { .. } => self.strip(rows),
+            Self::Reference { .. } => Ok(rows.in_full_light()),
+        }
+    }
+
+    /// How much light the maps let through to points of surfaces that face it.
+    pub(crate) fn visibility(&mut self, samples: &[&Sample]) -> Result<Vec<f32>> {
+        match self {
+            Self::Gpu { renderer, plan, .. } => {
+                let plan = plan.context("maps are rendered first")?;
+                let points: Vec<_> = samples
+                    .iter()
+                    .map(|s| [s.surface.position, s.surface.geometric_normal])
+                    .collect();
+                let visibility = renderer.visibility(plan, 0, &points)?;
+                ensure!(visibility.len() == samples.len(), "one value a sample");
+                Ok(visibility)
+            }
+            Self::Reference { maps, .. } => {
+                let (_, reference) = maps.as_ref().context("maps are rendered first")?;
+                Ok(samples.par_iter().map(|s| reference.visibility(0, s)).collect())
+            }
+        }
+    }
+}
