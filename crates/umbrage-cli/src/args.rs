@@ -1,5 +1,6 @@
 //! The command line: what may be asked for, parsed and checked, before any work begins.
 
+pub(crate) mod bench;
 pub(crate) mod theory;
 
 use crate::figures;
@@ -52,6 +53,10 @@ pub(crate) enum Command {
     Figures(Figures),
     /// Compute the papers' closed forms: errors, storage, warps, the Fourier step.
     Theory(theory::Theory),
+    /// Measure what techniques cost: planning, maps, pictures.
+    Bench(bench::Bench),
+    /// List the GPUs there are, and what they can do.
+    Devices(bench::Devices),
 }
 
 /// `umbrage render`.
@@ -439,7 +444,8 @@ pub(crate) fn parse(
         Command::Compare(compare) => compare.check(),
         Command::Sweep(sweep) => sweep.comparison.check(),
         Command::Plan(plan) => plan.check(),
-        Command::Scenes(_) | Command::Figures(_) => Ok(()),
+        Command::Scenes(_) | Command::Figures(_) | Command::Devices(_) => Ok(()),
+        Command::Bench(bench) => bench.check(),
         Command::Theory(theory) => theory.check(),
     };
     checked.map_err(|e| clap::Error::raw(clap::error::ErrorKind::ValueValidation, e))?;
@@ -495,12 +501,17 @@ impl Compare {
 impl ComparisonArgs {
     fn check(&mut self) -> Result<()> {
         self.texels.apply(&mut self.shadows)?;
-        for (i, technique) in self.shadows.iter().enumerate() {
-            let is_new = !self.shadows[..i].contains(technique);
-            ensure!(is_new, "--shadows: `{}` is given twice", technique.spec);
-        }
-        Ok(())
+        check_distinct(&self.shadows)
     }
+}
+
+/// That no technique is given twice.
+fn check_distinct(techniques: &[Technique]) -> Result<()> {
+    for (i, technique) in techniques.iter().enumerate() {
+        let is_new = !techniques[..i].contains(technique);
+        ensure!(is_new, "--shadows: `{}` is given twice", technique.spec);
+    }
+    Ok(())
 }
 
 impl Plan {

@@ -313,7 +313,7 @@ impl Picture {
     }
 }
 
-fn view_info(onlooker: &Onlooker) -> umbrage_measure::View {
+pub(crate) fn view_info(onlooker: &Onlooker) -> umbrage_measure::View {
     let look = &onlooker.look;
     umbrage_measure::View {
         name: onlooker.name.clone(),
@@ -326,7 +326,7 @@ fn view_info(onlooker: &Onlooker) -> umbrage_measure::View {
     }
 }
 
-fn light_info(lamp: &Lamp) -> LightInfo {
+pub(crate) fn light_info(lamp: &Lamp) -> LightInfo {
     let name = lamp.name.clone();
     match lamp.light {
         Light::Directional { direction } => {

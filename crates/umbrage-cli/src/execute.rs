@@ -2,14 +2,15 @@
 
 use crate::args::{Backend, ExecutionArgs};
 use crate::output::note;
-use crate::pixels::{Rows, Strip};
+use crate::pixels::{Rows, Strip, milliseconds};
 use crate::spec::Technique;
 use anyhow::{Context, Result, anyhow, ensure};
 use rayon::prelude::*;
-use umbrage::{Plan, Warp};
-use umbrage_render::{Gpu, Look, Renderer, SceneBuffers};
+use std::time::Instant;
+use umbrage::{Plan, ShadowMap, Warp};
+use umbrage_render::{Drawn, FrameTarget, Gpu, Look, Renderer, SceneBuffers, Timer};
 use umbrage_scene::Scene;
-use umbrage_trace::{Progress, Reference, Sample, Tracer};
+use umbrage_trace::{Progress, Reference, Sample, Tracer, View};
 use umbrage_wgpu::{Casters, ShadowOptions};
 
 /// What there is to render with.
@@ -194,6 +195,114 @@ impl<'a> Executor<'a> {
             Self::Reference { maps, .. } => {
                 let (_, reference) = maps.as_ref().context("maps are rendered first")?;
                 Ok(samples.par_iter().map(|s| reference.visibility(0, s)).collect())
+            }
+        }
+    }
+}
+
+/// What a frame cost, milliseconds.
+pub(crate) struct Costs {
+    /// The CPU's part, where there is another.
+    pub(crate) encode: Option<f64>,
+    pub(crate) depth: f64,
+    pub(crate) shade: f64,
+    /// Into which map what was drawn, where that is told.
+    pub(crate) drawn: Option<Vec<(usize, Drawn)>>,
+}
+
+/// Draws frame after frame for a stop-watch.
+pub(crate) struct Bencher<'a> {
+    technique: Technique,
+    kind: BencherKind<'a>,
+}
+
+enum BencherKind<'a> {
+    Gpu { renderer: Box<Renderer<'a, 'a>>, gpu: &'a Gpu, target: FrameTarget, timer: Option<Timer> },
+    Reference { tracer: &'a Tracer<'a> },
+}
+
+impl Sets<'_> {
+    /// Who draws frames of so many pixels.
+    pub(crate) fn bencher(&self, technique: &Technique, size: [u32; 2]) -> Result<Bencher<'_>> {
+        let kind = match self.executor(technique)? {
+            Executor::Gpu { renderer, gpu, .. } => {
+                let target = FrameTarget::new(gpu, size).context("--size")?;
+                BencherKind::Gpu { renderer, gpu, target, timer: Timer::new(gpu) }
+            }
+            Executor::Reference { tracer, .. } => BencherKind::Reference { tracer },
+        };
+        Ok(Bencher { technique: technique.clone(), kind })
+    }
+}
+
+impl Bencher<'_> {
+    pub(crate) fn technique(&self) -> &Technique {
+        &self.technique
+    }
+
+    /// `gpu` or `reference`.
+    pub(crate) fn name(&self) -> &'static str {
+        if self.is_gpu() { GPU } else { REFERENCE }
+    }
+
+    pub(crate) fn is_gpu(&self) -> bool {
+        matches!(self.kind, BencherKind::Gpu { .. })
+    }
+
+    /// Whether the GPU tells how long its passes take.
+    pub(crate) fn has_timestamps(&self) -> bool {
+        matches!(self.kind, BencherKind::Gpu { timer: Some(_), .. })
+    }
+
+    /// Memory of a plan's maps, once they are drawn.
+    pub(crate) fn bytes(&self, plan: &Plan) -> u64 {
+        match &self.kind {
+            BencherKind::Gpu { renderer, .. } => renderer.shadows().texture_bytes(),
+            BencherKind::Reference { .. } => {
+                let side = |n: u32| u64::from(n + 2 * self.technique.filter.reach_texels());
+                let texels = |m: &ShadowMap| side(m.resolution[0]) * side(m.resolution[1]);
+                4 * plan.maps.iter().filter(|m| !m.is_empty()).map(texels).sum::<u64>()
+            }
+        }
+    }
+
+    /// Draws a frame, and waits until it is done. `still`: maps that are as they were are not drawn again.
+    pub(crate) fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs> {
+        match &mut self.kind {
+            BencherKind::Gpu { renderer, gpu, target, timer } => {
+                let casters = if still { Casters::Still } else { Casters::Moved };
+                let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
+                let start = Instant::now();
+                let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
+                let mut encode = milliseconds(start);
+                let mut walls = [0.0; 2];
+                if timer.is_none() {
+                    gpu.wait()?;
+                    walls[0] = milliseconds(start);
+                }
+                let shading = Instant::now();
+                renderer.frame(&look, target, timer.as_ref())?;
+                encode += milliseconds(shading);
+                let [depth, shade] = match timer {
+                    Some(timer) => timer.read(gpu)?,
+                    None => {
+                        gpu.wait()?;
+                        walls[1] = milliseconds(shading);
+                        walls
+                    }
+                };
+                let depth = if drawn.is_empty() { 0.0 } else { depth };
+                Ok(Costs { encode: Some(encode), depth, shade, drawn: Some(drawn) })
+            }
+            BencherKind::Reference { tracer } => {
+                let start = Instant::now();
+                let reference = Reference::render(tracer, plan, self.technique.filter, &|_| {})?;
+                let depth = milliseconds(start);
+                let shading = Instant::now();
+                for range in view.bands() {
+                    Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
+                }
+                Ok(Costs { encode: None, depth, shade: milliseconds(shading), drawn: None })
             }
         }
     }

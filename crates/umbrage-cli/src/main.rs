@@ -3,8 +3,10 @@
 //! Two layers: `args` parses and checks, all else constructs and runs.
 
 mod args;
+mod bench;
 mod compare;
 mod comparison;
+mod devices;
 mod execute;
 mod figures;
 mod motion;
@@ -28,6 +30,7 @@ use std::process::ExitCode;
 const USAGE_ERROR: u8 = 2;
 
 fn main() -> ExitCode {
+    keep_drivers_quiet();
     let (command, verbose) = match args::parse(std::env::args_os()) {
         Ok(parsed) => parsed,
         Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -49,8 +52,22 @@ fn main() -> ExitCode {
         Command::Scenes(args) => scenes::run(args),
         Command::Figures(args) => figures::run(args, quiet),
         Command::Theory(args) => theory::run(args),
+        Command::Bench(args) => bench::run(args, quiet),
+        Command::Devices(args) => devices::run(args),
     })
 }
+
+/// A layer of Mesa's looks for a desktop to learn which GPU it prefers, and prints an error where there is none. We choose
+/// by ourselves.
+#[cfg(target_os = "linux")]
+#[expect(unsafe_code, reason = "there is no other way to tell the Vulkan loader to leave a layer out")]
+fn keep_drivers_quiet() {
+    // SAFETY: nothing else runs yet: this is the first that the process does.
+    unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+}
+
+#[cfg(not(target_os = "linux"))]
+fn keep_drivers_quiet() {}
 
 fn finish(result: anyhow::Result<()>) -> ExitCode {
     match result {

@@ -14,12 +14,13 @@ use umbrage_wgpu::{
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
+    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, Extent3d, FragmentState,
     IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
     RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
+    StoreOp, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
+    TextureView, TextureViewDescriptor, VertexAttribute, VertexBufferLayout, VertexFormat,
     VertexState, VertexStepMode,
 };
 
@@ -53,11 +54,9 @@ pub struct Look<'a> {
     pub light_index: u32,
 }
 
-/// What was drawn.
+/// What was drawn into a map or picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drawn {
-    /// Maps; for pictures 0.
-    pub maps: usize,
     /// Draw calls.
     pub draws: u32,
     /// Triangles, each instance's counted.
@@ -275,7 +274,8 @@ impl<'g, 's> Renderer<'g, 's> {
         &self.shadows
     }
 
-    /// Draws those of the plan's maps that are not as they should be, and waits for nothing.
+    /// Draws those of the plan's maps that are not as they should be, and waits for nothing. Returns what was drawn into
+    /// which: indices in the plan.
     ///
     /// # Errors
     /// Maps that this device cannot hold or draw.
@@ -284,7 +284,7 @@ impl<'g, 's> Renderer<'g, 's> {
         plan: &Plan,
         casters: Casters<'_>,
         timer: Option<&Timer>,
-    ) -> Result<Drawn, Error> {
+    ) -> Result<Vec<(usize, Drawn)>, Error> {
         let Self { gpu, scene, shadows, instances, .. } = self;
         let frame = Frame { plan, render_origin: plan.origin, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
@@ -298,7 +298,7 @@ impl<'g, 's> Renderer<'g, 's> {
                 (map, list)
             })
             .collect();
-        let mut drawn = Drawn::default();
+        let mut drawn = Vec::with_capacity(lists.len());
         if lists.is_empty() {
             return Ok(drawn);
         }
@@ -306,10 +306,11 @@ impl<'g, 's> Renderer<'g, 's> {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let pipelines = CasterPipelines { opaque: &self.opaque, masked: &self.masked };
         let masks = &self.masks;
-        drawn.maps = prepared.encode(&mut encoder, timer.map(Timer::depth_pass), |map| {
+        prepared.encode(&mut encoder, timer.map(Timer::depth_pass), |map| {
             let list = lists.iter().find(|(index, _)| *index == map.index);
             let draws = list.map_or(&[][..], |(_, list)| &instances.draws[list.clone()]);
-            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, &mut drawn);
+            let mut into_map = Drawn::default();
+            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, &mut into_map);
             for draw in draws {
                 let material = scene.meshes[draw.mesh].material;
                 let mask = masks[material].as_ref();
@@ -319,28 +320,29 @@ impl<'g, 's> Renderer<'g, 's> {
                 }
                 drawer.draw(draw);
             }
+            drawn.push((map.index, into_map));
         });
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
         Ok(drawn)
     }
 
-    /// Draws a frame to look at into a target of [`FRAME_FORMAT`] as large as the camera's picture, and a depth target of
-    /// [`DEPTH_FORMAT`]. The maps must be drawn.
+    /// Draws a frame to look at into a target as large as the camera's picture, and waits for nothing. The maps must be
+    /// drawn.
     ///
     /// # Errors
     /// What the device refuses.
     pub fn frame(
         &mut self,
         look: &Look<'_>,
-        color: &TextureView,
-        depth: &TextureView,
+        target: &FrameTarget,
         timer: Option<&Timer>,
     ) -> Result<Drawn, Error> {
         let tile = Tile::whole(look.camera);
         let pipelines = self.frame.clone();
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
-        let target = Target { color: &[color], depth, pipelines: &pipelines };
+        let FrameTarget { color_view, depth, .. } = target;
+        let target = Target { color: &[color_view], depth, pipelines: &pipelines };
         let drawn = self.encode_picture(&mut encoder, look, &tile, &target, timer)?;
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
@@ -411,6 +413,51 @@ impl<'g, 's> Renderer<'g, 's> {
 
 /// Format of frames to look at.
 pub const FRAME_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+
+/// What frames are drawn into.
+pub struct FrameTarget {
+    color: Texture,
+    color_view: TextureView,
+    depth: TextureView,
+}
+
+impl FrameTarget {
+    /// A target of this many pixels.
+    ///
+    /// # Errors
+    /// More than the device's textures have.
+    pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self, Error> {
+        let max = gpu.device().limits().max_texture_dimension_2d;
+        if width > max || height > max {
+            return Err(Error::TooLarge {
+                what: format!("a frame of {width}x{height} pixels"),
+                problem: format!("at most {max} each way"),
+            });
+        }
+        let texture = |format, usage| {
+            gpu.device().create_texture(&TextureDescriptor {
+                label: Some("frame"),
+                size: Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: TextureDimension::D2,
+                format,
+                usage: TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let color = texture(FRAME_FORMAT, TextureUsages::COPY_SRC);
+        let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
+        let depth = view(&texture(DEPTH_FORMAT, TextureUsages::empty()));
+        gpu.check()?;
+        Ok(Self { color_view: view(&color), color, depth })
+    }
+
+    /// The picture: sRGB, of [`FRAME_FORMAT`].
+    pub fn color(&self) -> &Texture {
+        &self.color
+    }
+}
 
 /// Where a picture goes, and how.
 pub(crate) struct Target<'a> {

@@ -62,8 +62,8 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
     }
 
-    /// Milliseconds of the last frame's stages, after waiting for it. A stage without a pass keeps the time of the last
-    /// frame that had one.
+    /// Milliseconds that the last frame's depth passes and its picture took on the GPU, after waiting for it. Depth
+    /// passes that there were not keep the time of the last frame that had some.
     ///
     /// # Errors
     /// The device's loss.

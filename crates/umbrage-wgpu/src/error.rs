@@ -27,7 +27,9 @@ pub enum Error {
         max: usize,
     },
     /// No GPU rasterises a map with logarithmic rows ([`Warp::Log`](umbrage::Warp::Log)).
-    #[error("map {map} has logarithmic rows, which no GPU rasterises: take another warp than `log`")]
+    #[error(
+        "map {map} has logarithmic rows, which no GPU rasterises: take another warp than `log`"
+    )]
     LogarithmicRows {
         /// Index of the map in the plan.
         map: usize,

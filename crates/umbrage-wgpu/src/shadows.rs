@@ -10,11 +10,11 @@ use umbrage::visibility::Filter;
 use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferDescriptor,
-    BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d, FilterMode, PrimitiveState,
-    Queue, SamplerBindingType, SamplerDescriptor, ShaderStages, Texture, TextureDescriptor,
-    TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView,
-    TextureViewDescriptor, TextureViewDimension,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferDescriptor, BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d,
+    FilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor, ShaderStages,
+    Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
+    TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
 /// Format of the depth texture.
@@ -180,12 +180,11 @@ impl Shadows {
     /// A filter that is out of its range.
     pub fn new(device: &Device, support: Support, options: &ShadowOptions) -> Result<Self, Error> {
         if let Filter::Pcf { n } = options.filter {
-            Filter::pcf(n).map_err(|e| Error::Invalid {
-                field: "options.filter",
-                problem: e.to_string(),
-            })?;
+            Filter::pcf(n)
+                .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
         }
-        let comparison = if support.depth_fetch { options.comparison } else { Comparison::Hardware };
+        let comparison =
+            if support.depth_fetch { options.comparison } else { Comparison::Hardware };
         let options = ShadowOptions { comparison, ..*options };
         let filter_mode = match (comparison, options.filter) {
             (Comparison::Hardware, Filter::Pcf { .. }) => FilterMode::Linear,
@@ -431,7 +430,8 @@ impl DepthTexture {
     /// Whether maps that need this much fit, and do not leave most of it unused.
     fn holds(&self, size: [u32; 2], layers: u32) -> bool {
         let Extent3d { width, height, depth_or_array_layers } = self.texture.size();
-        let texels = |[w, h]: [u32; 2], layers: u32| u64::from(w) * u64::from(h) * u64::from(layers);
+        let texels =
+            |[w, h]: [u32; 2], layers: u32| u64::from(w) * u64::from(h) * u64::from(layers);
         let has = texels([width, height], depth_or_array_layers);
         size[0] <= width
             && size[1] <= height
@@ -620,7 +620,6 @@ fn buffer(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
 
 /// Room for `n` elements that lookup reads.
 fn array<T>(device: &Device, support: &Support, n: usize) -> Buffer {
-    let usage =
-        if support.storage_buffers { BufferUsages::STORAGE } else { BufferUsages::UNIFORM };
+    let usage = if support.storage_buffers { BufferUsages::STORAGE } else { BufferUsages::UNIFORM };
     buffer(device, size_of::<T>() * n, usage)
 }

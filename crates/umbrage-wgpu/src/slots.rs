@@ -76,7 +76,8 @@ impl Slots {
         let texels = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
         let slots = self.sizes.iter().zip(&self.atlas.places);
         // Empty maps may be so for a moment only.
-        let full = slots.filter_map(|(&size, slot)| (!size.contains(&0)).then_some((size, (*slot)?)));
+        let full =
+            slots.filter_map(|(&size, slot)| (!size.contains(&0)).then_some((size, (*slot)?)));
         let [needed, taken] = full.fold([0, 0], |[needed, taken], (size, slot)| {
             [needed + texels(size), taken + texels(slot.size)]
         });
@@ -152,7 +153,8 @@ mod tests {
         assert!(place(&mut slots, &[[101, 200], [0, 0], [64, 64]]));
         let before = slots.places().to_vec();
         assert!(!place(&mut slots, &[[110, 210], [0, 0], [64, 70]]));
-        let origins = |p: &[Option<Place>]| p.iter().map(|p| p.map(|p| p.origin)).collect::<Vec<_>>();
+        let origins =
+            |p: &[Option<Place>]| p.iter().map(|p| p.map(|p| p.origin)).collect::<Vec<_>>();
         assert_eq!(origins(slots.places()), origins(&before));
         // An empty map keeps its slot.
         assert!(!place(&mut slots, &[[0, 0], [0, 0], [64, 70]]));

@@ -62,7 +62,8 @@ impl Support {
                 why: "without which depths cannot be compared: take another backend or device",
             });
         }
-        if limits.max_texture_dimension_2d < 2 || limits.max_uniform_buffer_binding_size < 16 << 10 {
+        if limits.max_texture_dimension_2d < 2 || limits.max_uniform_buffer_binding_size < 16 << 10
+        {
             return Err(Error::Unsupported {
                 what: "16 KiB of uniforms and textures of 2x2 texels",
                 why: "without which there is no room for a shadow map: raise the limits that you ask for",

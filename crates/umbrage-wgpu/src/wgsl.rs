@@ -72,7 +72,9 @@ fn choose(text: &str, flags: &[(&str, bool)]) -> String {
     let mut chosen = String::new();
     for line in text.lines() {
         match line.trim().split_once(' ').unwrap_or((line.trim(), "")) {
-            ("//IF", name) => stack.push(flags.iter().any(|&(flag, is_set)| flag == name && is_set)),
+            ("//IF", name) => {
+                stack.push(flags.iter().any(|&(flag, is_set)| flag == name && is_set))
+            }
             ("//ELSE", _) => {
                 if let Some(is_kept) = stack.last_mut() {
                     *is_kept = !*is_kept;
@@ -191,13 +193,19 @@ mod tests {
     fn structs_are_laid_out_alike() {
         let (module, _) = validated(&(lookup(0, Filter::Hard, Comparison::PerTexel, true) + USER));
         let m = &module;
-        check_layout!(m, "ShadowSettings", data::Settings, [
-            bias_texels, bias_metres, light_count, texture_scale
-        ]);
+        check_layout!(
+            m,
+            "ShadowSettings",
+            data::Settings,
+            [bias_texels, bias_metres, light_count, texture_scale]
+        );
         check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, padding]);
-        check_layout!(m, "ShadowMap", data::Map, [
-            s, t, depth, w, fade_from, size, origin, layer, first_plane, plane_count, index
-        ]);
+        check_layout!(
+            m,
+            "ShadowMap",
+            data::Map,
+            [s, t, depth, w, fade_from, size, origin, layer, first_plane, plane_count, index]
+        );
         let (module, _) = validated(&mesh(&SUPPORT, true));
         check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
         check_layout!(&module, "ShadowMask", data::Mask, [factor, cutoff]);

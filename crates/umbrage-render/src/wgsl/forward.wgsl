@@ -109,13 +109,12 @@ struct Surface {
 
 fn surface(in: Fragment) -> Surface {
     // Derivatives first, where all of a quad is still there.
-    var normal = normalize_or_zero(shadow_normal(in.position));
+    let normal = normalize_or_zero(shadow_normal(in.position));
     let texel = textureSampleLevel(material_texture, material_sampler, in.uv, 0.0);
     let color = material.base_color * texel;
     if (color.a < material.cutoff) {
         discard;
     }
-    normal = select(normal, -normal, dot(normal, in.position) > 0.0);
     var shading_normal = normalize_or_zero(in.normal);
     if (all(shading_normal == vec3f(0.0))) {
         shading_normal = normal;

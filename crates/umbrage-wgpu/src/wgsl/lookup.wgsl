@@ -102,10 +102,10 @@ fn shadow_visibility(light: u32, position: vec3f, normal: vec3f) -> f32 {
     return sum / (1.0 - left);
 }
 
-// The normal of the triangle that is being drawn. Only in fragment shaders, in uniform control flow. Most exact
-// where `position` is small: relative to the eye.
+// The normal of the triangle that is being drawn, turned to the viewer, of any length (in a right-handed space). Only in
+// fragment shaders, in uniform control flow. Most exact where `position` is small: relative to the eye.
 fn shadow_normal(position: vec3f) -> vec3f {
-    return cross(dpdx(position), dpdy(position));
+    return cross(dpdy(position), dpdx(position));
 }
 
 // The map that has the largest share in a point, and where in it the point lies.

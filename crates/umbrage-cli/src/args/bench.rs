@@ -1,0 +1,74 @@
+//! `umbrage bench` and `umbrage devices`: what may be asked for.
+
+use super::{
+    DEFAULT_TECHNIQUES, ExecutionArgs, Fit, LightArgs, SHADOWS_HELP, SceneArgs, TexelArgs, ViewArgs,
+    check_distinct,
+};
+use crate::spec::Technique;
+use anyhow::Result;
+use clap::Args;
+
+/// `umbrage bench`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each frame plans, draws the maps, and draws the picture; techniques take turns, so that ratios between them hold on a
+noisy machine. `depth` and `shade` are the GPU's own time where it tells (`umbrage devices`), else wall-clock time;
+`frame` is all from planning to the GPU's being done, on the wall clock.
+
+Examples:
+  umbrage bench town --shadows uniform --shadows lispsm --shadows lispsm+z4
+  umbrage bench level.glb --shadows adaptive:pcf3@2048 --still --json")]
+pub(crate) struct Bench {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
+    #[arg(long_help = SHADOWS_HELP,
+        long, value_name = "SPEC",
+        default_values = DEFAULT_TECHNIQUES
+    )]
+    pub(crate) shadows: Vec<Technique>,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
+    /// Frames that count, after two that do not.
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(20..=10000))]
+    pub(crate) frames: u32,
+    /// Nothing moves: maps that are as they were are not drawn again.
+    #[arg(long)]
+    pub(crate) still: bool,
+    /// What the maps are fitted to.
+    #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
+    pub(crate) fit: Fit,
+    #[command(flatten)]
+    pub(crate) execution: ExecutionArgs,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+}
+
+impl Bench {
+    pub(super) fn check(&mut self) -> Result<()> {
+        self.texels.apply(&mut self.shadows)?;
+        self.view.check()?;
+        self.light.check()?;
+        check_distinct(&self.shadows)
+    }
+}
+
+/// `umbrage devices`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The first that can do what shadows need is taken. WGPU_ADAPTER_NAME takes another by a part of its name,
+WGPU_BACKEND by its kind: vulkan, metal, dx12, gl.
+
+Examples:
+  umbrage devices
+  umbrage devices --json")]
+pub(crate) struct Devices {
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+}

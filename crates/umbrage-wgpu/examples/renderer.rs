@@ -1,0 +1,139 @@
+//! The smallest complete renderer with Umbrage's shadows: boxes on a plain, drawn without a window.
+//!
+//! ```sh
+//! cargo run --release -p umbrage-wgpu --example renderer -- shadows.png
+//! ```
+//!
+//! What has to do with shadows is numbered; all else is what any wgpu renderer does.
+
+mod headless;
+
+use bytemuck::{bytes_of, cast_slice};
+use glam::{DAffine3, DVec3, Vec3, camera::rh};
+use std::error::Error;
+use umbrage::visibility::Filter;
+use umbrage::{Aabb, Bounds, Camera, ClipDepth, Light, Options, Partition, Planner};
+use umbrage_wgpu::{
+    CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
+};
+use wgpu::BufferUsages;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+const SIZE: [u32; 2] = [1280, 720];
+
+#[rustfmt::skip]
+const CUBE: [u16; 36] = [
+    0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5,
+];
+
+/// A plain, and boxes on it: where a cube stands, and how large.
+fn models() -> impl Iterator<Item = DAffine3> {
+    let place = |at: [f64; 3], size: [f64; 3]| {
+        DAffine3::from_translation(at.into()) * DAffine3::from_scale(size.into())
+    };
+    let boxes = (0..400).map(move |i| {
+        let [x, z] = [f64::from(i % 20) * 9.0 - 90.0, f64::from(i / 20) * 9.0 - 150.0];
+        place([x, 0.0, z], [2.0, 1.0 + f64::from(i * 7 % 5) * 1.5, 2.0])
+            * DAffine3::from_rotation_y(f64::from(i))
+    });
+    [place([0.0, -1.0, 0.0], [400.0, 1.0, 400.0])].into_iter().chain(boxes)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // 1. Ask for the features that make shadows faster, as far as the adapter has them.
+    let instance = wgpu::Instance::default();
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        required_features: adapter.features() & Support::WANTED_FEATURES,
+        ..Default::default()
+    }))?;
+
+    let corners: [Vec3; 8] = std::array::from_fn(|i| {
+        Vec3::new((i & 1) as f32 - 0.5, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32 - 0.5)
+    });
+    let buffer = |contents: &[u8], usage| {
+        device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
+    };
+    let vertices = buffer(cast_slice(&corners), BufferUsages::VERTEX);
+    let indices = buffer(cast_slice(&CUBE), BufferUsages::INDEX);
+    let instances: Vec<_> = models().map(|m| CasterInstance::new(&m, DVec3::ZERO)).collect();
+    let instances = buffer(cast_slice(&instances), BufferUsages::VERTEX);
+    let draw = |pass: &mut wgpu::RenderPass<'_>, instance: u32| {
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_vertex_buffer(1, instances.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint16);
+        pass.draw_indexed(0..36, 0, instance..instance + 1);
+    };
+
+    // 2. Plan the maps, each frame, with a planner that you keep: from your camera's matrices, the light, and boxes around
+    //    what there is.
+    let eye = Vec3::new(4.0, 5.0, 30.0);
+    let view_from_world = rh::view::look_at_mat4(eye, Vec3::new(-6.0, 1.0, 0.0), Vec3::Y);
+    let clip_from_view = rh::proj::directx::perspective(0.9, 16.0 / 9.0, 0.1, 300.0);
+    let camera = Camera::from_matrices(
+        view_from_world.as_dmat4().inverse(),
+        clip_from_view.as_dmat4(),
+        ClipDepth::ZeroToOne,
+        None,
+        SIZE,
+    )?;
+    let direction = DVec3::new(-0.7, -0.6, -0.3);
+    let around =
+        |m: DAffine3| Aabb::around(corners.map(|corner| m.transform_point3(corner.as_dvec3())));
+    let boxes: Vec<Aabb> = models().map(around).collect();
+    let bounds = Bounds { receiver_parts: &boxes, ..Bounds::default() };
+    let options = Options { partition: Partition::slices(2), ..Options::default() };
+    let mut planner = Planner::new();
+    let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &options)?;
+
+    // 3. The shadows themselves, once: what filters them. And a pipeline that draws casters; for one of your own,
+    //    `Shadows::caster_wgsl`, `depth_stencil_state` and `primitive_state` have what it needs.
+    let shadow_options = ShadowOptions { filter: Filter::pcf(3)?, ..Default::default() };
+    let mut shadows = Shadows::new(&device, Support::new(&adapter, &device)?, &shadow_options)?;
+    let positions = wgpu::VertexBufferLayout {
+        array_stride: 12,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+    };
+    let layouts = [Some(positions), Some(CasterInstance::LAYOUT)];
+    let casters = MeshCasters::new(&device, &shadows, MeshKind::Opaque, &layouts);
+
+    // 4. Your pipeline: Umbrage's text before your shader's, for the bind group that you name, and its layout there.
+    let text = shadows.lookup_wgsl(1) + include_str!("shader.wgsl");
+    let source = wgpu::ShaderSource::Wgsl(text.into());
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    let to_sun = -direction.normalize().as_vec3().extend(0.0);
+    let view = [bytes_of(&(clip_from_view * view_from_world)), bytes_of(&to_sun)].concat();
+    let (view_layout, view_group) = headless::uniform(&device, &view);
+    let pipeline = headless::pipeline(
+        &device,
+        &module,
+        &[Some(&view_layout), Some(shadows.lookup_layout())],
+        &layouts,
+    );
+
+    // 5. Each frame: prepare the shadows, and draw casters into the maps that need it. Shaders here work in world space, so
+    //    its origin is zero; a camera-relative renderer would give the eye.
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
+    shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, None, |map| {
+        map.pass.set_pipeline(casters.pipeline());
+        for (i, _) in (0..).zip(&boxes).filter(|(_, aabb)| map.map.may_cast(**aabb)) {
+            draw(map.pass, i);
+        }
+    });
+
+    // 6. Shade, with Umbrage's bind group where its text looks for it.
+    let target = headless::Target::new(&device, SIZE);
+    let mut pass = target.begin(&mut encoder);
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &view_group, &[]);
+    pass.set_bind_group(1, shadows.lookup_bind_group(), &[]);
+    (0..boxes.len() as u32).for_each(|i| draw(&mut pass, i));
+    drop(pass);
+
+    let path = std::env::args().nth(1).unwrap_or_else(|| "shadows.png".to_owned());
+    target.finish(&device, &queue, encoder, &path)?;
+    println!("{path}: {} maps, {} texels", plan.maps.len(), plan.texels());
+    Ok(())
+}
