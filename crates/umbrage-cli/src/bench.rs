@@ -56,8 +56,6 @@ struct DrawnJson {
 #[derive(Serialize)]
 struct TimesJson {
     plan: Option<Spread>,
-    /// The CPU's part of drawing: culling, uploading, encoding.
-    encode: Option<Spread>,
     depth: Option<Spread>,
     filter: Option<Spread>,
     shade: Option<Spread>,
@@ -158,9 +156,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             .map_err(|e| technique.error(&e))?;
         let first = contender.frames.first().context("frames")?;
         let counted = &contender.frames[WARM_UP as usize..];
-        let spread = |value: fn(&Frame) -> Option<f64>| {
-            counted.iter().map(value).collect::<Option<Vec<_>>>().and_then(|v| Spread::of(v.into_iter()))
-        };
+        let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
         let mut map_draws: Vec<DrawnJson> = plan
             .maps
             .iter()
@@ -190,12 +186,11 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             storage_factor: plan.storage_factor(),
             map_draws,
             ms: TimesJson {
-                plan: spread(|f| Some(f.plan)),
-                encode: spread(|f| f.costs.encode),
-                depth: spread(|f| Some(f.costs.depth)),
+                plan: spread(|f| f.plan),
+                depth: spread(|f| f.costs.depth),
                 filter: None,
-                shade: spread(|f| Some(f.costs.shade)),
-                frame: spread(|f| Some(f.frame)),
+                shade: spread(|f| f.costs.shade),
+                frame: spread(|f| f.frame),
             },
             first_ms: FirstJson { depth: first.costs.depth, frame: first.frame },
         });
@@ -220,7 +215,6 @@ fn table(bench: &BenchJson) -> String {
     let heads = [
         "median ms of",
         "plan",
-        "encode",
         "depth",
         "shade",
         "frame",
@@ -241,7 +235,6 @@ fn table(bench: &BenchJson) -> String {
         vec![
             r.shadows.clone(),
             ms(r.ms.plan, 3),
-            ms(r.ms.encode, 3),
             ms(r.ms.depth, 2),
             ms(r.ms.shade, 2),
             ms(r.ms.frame, 2),

@@ -114,15 +114,27 @@ impl<'a> Sets<'a> {
                 let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
                 Ok(Executor::Gpu { renderer: Box::new(renderer), gpu, plan: None })
             }
-            _ => Ok(Executor::Reference { tracer: &self.tracer, technique: technique.clone(), maps: None }),
+            _ => Ok(Executor::Reference {
+                tracer: &self.tracer,
+                technique: technique.clone(),
+                maps: None,
+            }),
         }
     }
 }
 
 /// Renders a technique's maps and looks them up.
 pub(crate) enum Executor<'a> {
-    Gpu { renderer: Box<Renderer<'a, 'a>>, gpu: &'a Gpu, plan: Option<&'a Plan> },
-    Reference { tracer: &'a Tracer<'a>, technique: Technique, maps: Option<(&'a Plan, Reference<'a>)> },
+    Gpu {
+        renderer: Box<Renderer<'a, 'a>>,
+        gpu: &'a Gpu,
+        plan: Option<&'a Plan>,
+    },
+    Reference {
+        tracer: &'a Tracer<'a>,
+        technique: Technique,
+        maps: Option<(&'a Plan, Reference<'a>)>,
+    },
 }
 
 impl<'a> Executor<'a> {
@@ -202,8 +214,6 @@ impl<'a> Executor<'a> {
 
 /// What a frame cost, milliseconds.
 pub(crate) struct Costs {
-    /// The CPU's part, where there is another.
-    pub(crate) encode: Option<f64>,
     pub(crate) depth: f64,
     pub(crate) shade: f64,
     /// Into which map what was drawn, where that is told.
@@ -274,7 +284,6 @@ impl Bencher<'_> {
                 let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
                 let start = Instant::now();
                 let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
-                let mut encode = milliseconds(start);
                 let mut walls = [0.0; 2];
                 if timer.is_none() {
                     gpu.wait()?;
@@ -282,7 +291,6 @@ impl Bencher<'_> {
                 }
                 let shading = Instant::now();
                 renderer.frame(&look, target, timer.as_ref())?;
-                encode += milliseconds(shading);
                 let [depth, shade] = match timer {
                     Some(timer) => timer.read(gpu)?,
                     None => {
@@ -292,7 +300,7 @@ impl Bencher<'_> {
                     }
                 };
                 let depth = if drawn.is_empty() { 0.0 } else { depth };
-                Ok(Costs { encode: Some(encode), depth, shade, drawn: Some(drawn) })
+                Ok(Costs { depth, shade, drawn: Some(drawn) })
             }
             BencherKind::Reference { tracer } => {
                 let start = Instant::now();
@@ -302,7 +310,7 @@ impl Bencher<'_> {
                 for range in view.bands() {
                     Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
                 }
-                Ok(Costs { encode: None, depth, shade: milliseconds(shading), drawn: None })
+                Ok(Costs { depth, shade: milliseconds(shading), drawn: None })
             }
         }
     }

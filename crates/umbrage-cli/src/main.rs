@@ -60,7 +60,10 @@ fn main() -> ExitCode {
 /// A layer of Mesa's looks for a desktop to learn which GPU it prefers, and prints an error where there is none. We choose
 /// by ourselves.
 #[cfg(target_os = "linux")]
-#[expect(unsafe_code, reason = "there is no other way to tell the Vulkan loader to leave a layer out")]
+#[expect(
+    unsafe_code,
+    reason = "there is no other way to tell the Vulkan loader to leave a layer out"
+)]
 fn keep_drivers_quiet() {
     // SAFETY: nothing else runs yet: this is the first that the process does.
     unsafe { std::env::set_var("NODEVICE_SELECT", "1") };

@@ -258,6 +258,8 @@ struct ErrorJson<'a> {
 struct ResultJson<'a> {
     shadows: &'a str,
     backend: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    device: Option<&'a str>,
     maps: u32,
     texels: u64,
     #[serde(flatten)]
@@ -273,7 +275,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         let Measured {
             shadows,
             backend,
-            device: _,
+            device,
             maps,
             texels,
             metrics,
@@ -286,6 +288,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         Self {
             shadows,
             backend,
+            device: device.as_deref(),
             maps: *maps,
             texels: *texels,
             metrics,

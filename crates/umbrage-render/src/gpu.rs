@@ -2,8 +2,9 @@ use crate::Error;
 use std::sync::{Arc, Mutex, PoisonError};
 use umbrage_wgpu::Support;
 use wgpu::{
-    Adapter, AdapterInfo, Backends, Device, DeviceDescriptor, DeviceType, ExperimentalFeatures,
-    Features, Instance, InstanceDescriptor, MemoryHints, PollType, Queue, Trace,
+    Adapter, AdapterInfo, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
+    DeviceDescriptor, DeviceType, ExperimentalFeatures, Features, Instance, InstanceDescriptor,
+    MemoryHints, PollType, Queue, Trace,
 };
 
 /// A device without a window.
@@ -96,10 +97,8 @@ fn open(adapter: &Adapter) -> Result<(Device, Queue), Error> {
         memory_hints: MemoryHints::Performance,
         trace: Trace::Off,
     });
-    pollster::block_on(request).map_err(|e| Error::NoDevice {
-        adapter: adapter.get_info().name,
-        problem: e.to_string(),
-    })
+    pollster::block_on(request)
+        .map_err(|e| Error::NoDevice { adapter: adapter.get_info().name, problem: e.to_string() })
 }
 
 impl Gpu {
@@ -177,8 +176,22 @@ impl Gpu {
         polled.map(drop).map_err(|e| Error::Lost(e.to_string()))
     }
 
+    /// A buffer that holds this, a multiple of four bytes. Written through the queue, for mapping panics on a device
+    /// that was lost.
+    pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
+        let buffer = self.device.create_buffer(&BufferDescriptor {
+            label: Some(label),
+            // Buffers of no size cannot be bound.
+            size: contents.len().max(16) as u64,
+            usage: usage | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
+    }
+
     /// What is in a buffer that can be mapped, once all that was submitted is done.
-    pub(crate) fn read<T: bytemuck::Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, Error> {
+    pub(crate) fn read<T: bytemuck::Pod>(&self, buffer: &Buffer) -> Result<Vec<T>, Error> {
         // The callback tells nothing that waiting does not.
         buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         self.wait()?;

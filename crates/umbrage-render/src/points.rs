@@ -6,7 +6,6 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use umbrage::Plan;
 use umbrage_wgpu::Shadows;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, BufferBindingType, BufferDescriptor, BufferUsages,
@@ -106,11 +105,8 @@ impl Renderer<'_, '_> {
     fn look_up(&self, points: &[Point]) -> Result<Vec<f32>, Error> {
         let device = self.gpu.device();
         let Some(Points { pipeline, layout }) = &self.points else { return Ok(Vec::new()) };
-        let input = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("points"),
-            contents: bytemuck::cast_slice(points),
-            usage: BufferUsages::STORAGE,
-        });
+        let contents = bytemuck::cast_slice(points);
+        let input = self.gpu.buffer("points", contents, BufferUsages::STORAGE);
         let buffer = |usage| {
             device.create_buffer(&BufferDescriptor {
                 label: Some("visibility"),

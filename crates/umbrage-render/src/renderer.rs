@@ -14,8 +14,8 @@ use umbrage_wgpu::{
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, Extent3d, FragmentState,
-    IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
+    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, Extent3d,
+    FragmentState, IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
     RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
@@ -112,7 +112,10 @@ impl Instances {
             let max = gpu.device().limits().max_buffer_size;
             if bytes.len() as u64 > max {
                 return Err(Error::TooLarge {
-                    what: format!("the scene's {} instances, in all maps together,", self.list.len()),
+                    what: format!(
+                        "the scene's {} instances, in all maps together,",
+                        self.list.len()
+                    ),
                     problem: format!("a buffer takes {max} bytes"),
                 });
             }
@@ -201,6 +204,7 @@ impl<'g, 's> Renderer<'g, 's> {
             let mask = m.mask.as_ref()?;
             masked.mask(
                 device,
+                gpu.queue(),
                 &Mask {
                     texture: &mask.texture,
                     sampler: &mask.sampler,
@@ -314,7 +318,9 @@ impl<'g, 's> Renderer<'g, 's> {
             for draw in draws {
                 let material = scene.meshes[draw.mesh].material;
                 let mask = masks[material].as_ref();
-                drawer.choose(usize::from(mask.is_some()), |pass| pipelines.set(pass, mask.is_some()));
+                drawer.choose(usize::from(mask.is_some()), |pass| {
+                    pipelines.set(pass, mask.is_some())
+                });
                 if let Some(mask) = mask {
                     drawer.pass.set_bind_group(1, mask, &[]);
                 }
@@ -368,7 +374,10 @@ impl<'g, 's> Renderer<'g, 's> {
     ) -> Result<Drawn, Error> {
         let Self { gpu, scene, instances, .. } = self;
         let Look { camera, light, light_index } = *look;
-        debug_assert!(self.eye == DVec3::ZERO || self.eye == camera.eye(), "render space is the eye's");
+        debug_assert!(
+            self.eye == DVec3::ZERO || self.eye == camera.eye(),
+            "render space is the eye's"
+        );
         let view = ViewUniform::new(camera, light, light_index, tile);
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
         let planes = tile.planes(camera);

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture, Wrap};
-use wgpu::util::{BufferInitDescriptor, DeviceExt, TextureDataOrder};
+use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
     BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingResource, BindingType, Buffer,
@@ -94,11 +94,6 @@ impl<'a> SceneBuffers<'a> {
                 });
             }
         }
-        let buffer = |label, contents: &[u8], usage| {
-            // Buffers of no size cannot be bound.
-            let contents = if contents.is_empty() { &[0; 16] } else { contents };
-            device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents, usage })
-        };
         let all_positions: Vec<Vec3> =
             scene.meshes.iter().flat_map(|m| m.positions.iter().copied()).collect();
         let attributes: Vec<Attributes> = scene.meshes.iter().flat_map(attributes).collect();
@@ -123,17 +118,17 @@ impl<'a> SceneBuffers<'a> {
         by_mesh.sort_by_key(|&i| scene.instances[i].mesh);
         let buffers = Self {
             scene,
-            positions: buffer(
+            positions: gpu.buffer(
                 "positions",
                 bytemuck::cast_slice(&all_positions),
                 BufferUsages::VERTEX,
             ),
-            attributes: buffer(
+            attributes: gpu.buffer(
                 "attributes",
                 bytemuck::cast_slice(&attributes),
                 BufferUsages::VERTEX,
             ),
-            indices: buffer("indices", bytemuck::cast_slice(&all_indices), BufferUsages::INDEX),
+            indices: gpu.buffer("indices", bytemuck::cast_slice(&all_indices), BufferUsages::INDEX),
             meshes,
             materials: materials.list,
             material_layout,
@@ -178,7 +173,16 @@ impl<'a> Materials<'a> {
     fn new(gpu: &'a Gpu, scene: &'a Scene, layout: &'a BindGroupLayout, opaque: bool) -> Self {
         let textures = scene.textures.iter().map(|t| upload(gpu, t)).collect();
         let white = upload(gpu, &Texture::default());
-        Self { gpu, scene, layout, opaque, textures, white, list: Vec::new(), known: HashMap::new() }
+        Self {
+            gpu,
+            scene,
+            layout,
+            opaque,
+            textures,
+            white,
+            list: Vec::new(),
+            known: HashMap::new(),
+        }
     }
 
     fn index(&mut self, material: usize, has_uvs: bool) -> usize {
@@ -218,11 +222,8 @@ impl<'a> Materials<'a> {
             cutoff: cutoff.unwrap_or(f32::MIN),
             padding: [0.0; 3],
         };
-        let uniform = device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("material"),
-            contents: bytemuck::bytes_of(&uniform),
-            usage: BufferUsages::UNIFORM,
-        });
+        let contents = bytemuck::bytes_of(&uniform);
+        let uniform = self.gpu.buffer("material", contents, BufferUsages::UNIFORM);
         let entry = |binding, resource| BindGroupEntry { binding, resource };
         let bind_group = device.create_bind_group(&BindGroupDescriptor {
             label: Some("material"),

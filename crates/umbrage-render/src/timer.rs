@@ -2,8 +2,8 @@
 
 use crate::{Error, Gpu};
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, QuerySet,
-    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, QuerySet, QuerySetDescriptor,
+    QueryType, RenderPassTimestampWrites,
 };
 
 /// Measures one frame at a time.

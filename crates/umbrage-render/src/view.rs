@@ -69,10 +69,8 @@ impl Tile {
             let normal = rays[i].cross(rays[(i + 1) % 4]).normalize_or_zero();
             Plane::through(camera.eye(), if normal.dot(middle) < 0.0 { -normal } else { normal })
         };
-        let near = Plane::through(
-            camera.eye() + camera.forward() * camera.near(),
-            camera.forward(),
-        );
+        let near =
+            Plane::through(camera.eye() + camera.forward() * camera.near(), camera.forward());
         [side(0), side(1), side(2), side(3), near]
     }
 }

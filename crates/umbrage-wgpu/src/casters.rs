@@ -2,14 +2,14 @@ use crate::{Shadows, data, wgsl};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec4};
 use std::mem::size_of;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, BufferUsages, Device,
-    FragmentState, PipelineCompilationOptions, PipelineLayoutDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, Sampler, SamplerBindingType, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, TextureSampleType, TextureView, TextureViewDimension, VertexAttribute,
-    VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
+    BindGroupLayoutEntry, BindingResource, BindingType, BufferBindingType, BufferDescriptor,
+    BufferUsages, Device, FragmentState, PipelineCompilationOptions, PipelineLayoutDescriptor,
+    Queue, RenderPipeline, RenderPipelineDescriptor, Sampler, SamplerBindingType,
+    ShaderModuleDescriptor, ShaderSource, ShaderStages, TextureSampleType, TextureView,
+    TextureViewDimension, VertexAttribute, VertexBufferLayout, VertexFormat, VertexState,
+    VertexStepMode,
 };
 
 /// Draws plain meshes, instanced, into shadow maps: positions times a matrix, and an alpha mask if there is one.
@@ -130,13 +130,16 @@ impl MeshCasters {
     }
 
     /// The bind group of a mask; `None` if the pipeline is not for masked meshes.
-    pub fn mask(&self, device: &Device, mask: &Mask<'_>) -> Option<BindGroup> {
+    pub fn mask(&self, device: &Device, queue: &Queue, mask: &Mask<'_>) -> Option<BindGroup> {
         let layout = self.mask_layout.as_ref()?;
-        let uniform = device.create_buffer_init(&BufferInitDescriptor {
+        let contents = data::Mask { factor: mask.factor, cutoff: mask.cutoff };
+        let uniform = device.create_buffer(&BufferDescriptor {
             label: Some("shadow mask"),
-            contents: bytemuck::bytes_of(&data::Mask { factor: mask.factor, cutoff: mask.cutoff }),
-            usage: BufferUsages::UNIFORM,
+            size: size_of::<data::Mask>() as u64,
+            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
+        queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&contents));
         let entry = |binding, resource| BindGroupEntry { binding, resource };
         Some(device.create_bind_group(&BindGroupDescriptor {
             label: Some("shadow mask"),

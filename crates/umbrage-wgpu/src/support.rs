@@ -23,8 +23,8 @@ pub struct Support {
     pub max_side: u32,
     /// Layers of a texture.
     pub max_layers: u32,
-    /// Multiple of which offsets into uniform buffers must be, bytes.
-    pub(crate) uniform_alignment: u32,
+    /// What offsets into uniform buffers must be multiples of, bytes.
+    pub uniform_alignment: u32,
 }
 
 /// Storage buffers that lookup takes.

@@ -172,13 +172,10 @@ impl Packing {
 
 impl Boxes {
     /// The maps with their gutters, if each of them fits.
-    fn new(
-        sizes: &[[u32; 2]],
-        gutter_texels: u32,
-        max_side: u32,
-    ) -> Result<Self, AtlasTooLarge> {
-        let with_gutters =
-            |size: [u32; 2]| size.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)));
+    fn new(sizes: &[[u32; 2]], gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
+        let with_gutters = |size: [u32; 2]| {
+            size.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)))
+        };
         let full = || sizes.iter().copied().enumerate().filter(|(_, size)| !size.contains(&0));
         let texels = full().map(|(_, m)| with_gutters(m).into_iter().fold(1, u64::saturating_mul));
         let too_large = AtlasTooLarge {

@@ -1,8 +1,8 @@
 //! `umbrage bench` and `umbrage devices`: what may be asked for.
 
 use super::{
-    DEFAULT_TECHNIQUES, ExecutionArgs, Fit, LightArgs, SHADOWS_HELP, SceneArgs, TexelArgs, ViewArgs,
-    check_distinct,
+    DEFAULT_TECHNIQUES, ExecutionArgs, Fit, LightArgs, SHADOWS_HELP, SceneArgs, TexelArgs,
+    ViewArgs, check_distinct,
 };
 use crate::spec::Technique;
 use anyhow::Result;

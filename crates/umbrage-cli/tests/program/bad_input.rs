@@ -116,8 +116,18 @@ fn options_of_some_commands() {
         (&["render", "pole", "-o", "p.png", "--samples", "0"], "1..=16"),
         (&["compare", "pole", "-o", "r", "--samples", "17"], "1..=16"),
         (&["render", "pole", "-o", "p.png", "--aov", "colour"], "color"),
-        (&["render", "pole", "-o", "p.png", "--backend", "gpu"], "--backend: gpu is not built"),
-        (&["compare", "pole", "-o", "r", "--backend", "gpu"], "--backend: gpu is not built"),
+        (
+            &["render", "pole", "-o", "p.png", "--backend", "gpu", "--shadows", "log@64"],
+            "--backend: no GPU rasterises the rows of `log@64`; take reference or auto",
+        ),
+        (
+            &["compare", "pole", "-o", "r", "--backend", "gpu", "--shadows", "log"],
+            "--backend: no GPU rasterises the rows of `log`",
+        ),
+        (&["bench", "pole", "--frames", "5"], "20..=10000"),
+        (&["bench", "pole", "--shadows", "psm", "--shadows", "psm"], "`psm` is given twice"),
+        (&["bench"], "<SCENE>"),
+        (&["devices", "pole"], "'pole'"),
         (
             &["compare", "pole", "-o", "r", "--backend", "cuda"],
             "[possible values: auto, gpu, reference]",

@@ -38,7 +38,8 @@ fn the_report_has_all_that_is_documented() {
     assert_eq!(results[1]["shadows"], "lispsm:pcf3@64x32");
     assert_eq!(results[1]["texels"], 64 * 32);
     for result in results {
-        assert_eq!(result["backend"], "reference");
+        assert_eq!(result["backend"], "gpu");
+        assert!(!result["device"].as_str().unwrap().is_empty());
         assert_eq!(result["maps"], 1);
         for figure in ["wrong_fraction", "mean_abs_error", "flip", "storage_factor"] {
             assert!(result[figure].as_f64().unwrap() >= 0.0, "{figure}");

@@ -1,6 +1,7 @@
 //! The real binary, end to end.
 
 mod bad_input;
+mod bench;
 mod compare;
 mod desk;
 mod figures;

@@ -141,13 +141,37 @@ fn an_existing_picture_is_replaced_and_nothing_is_left_beside_it() {
 }
 
 #[test]
-fn auto_says_what_it_takes_and_reference_does_not() {
+fn auto_says_what_it_takes_and_others_do_not() {
     let desk = Desk::new();
-    let run = |backend| {
-        desk.run(&["render", "pole", "--size", "8x8", "-o", "p.png", "--backend", backend])
+    let run = |options: &[&str]| {
+        let common = ["render", "pole", "--size", "8x8", "-o", "p.png"];
+        let run = desk.run(&[&common[..], options].concat());
+        assert_eq!(run.code, 0, "{options:?}: {}", run.stderr);
+        run.stderr
     };
-    assert!(run("auto").stderr.contains("reference"));
-    assert_eq!(run("reference").stderr, "");
+    assert!(run(&["--backend", "auto"]).starts_with("backend: gpu, "));
+    let log = run(&["--shadows", "log"]);
+    assert_eq!(log, "backend: reference, on the CPU (no GPU rasterises `log`)\n");
+    assert_eq!(run(&["--backend", "gpu"]), "");
+    assert_eq!(run(&["--backend", "reference"]), "");
+}
+
+/// Every kind of picture, from both.
+#[test]
+fn backends_agree() {
+    let desk = Desk::new();
+    let common = "render town:20 --size 160x90 --samples 2 --shadows lispsm+z2:pcf3@256";
+    for aov in AOVS {
+        let [gpu, reference] = ["gpu", "reference"].map(|backend| {
+            let words = format!("{common} --aov {aov} --backend {backend} -o p.png");
+            desk.succeed(&words.split_whitespace().collect::<Vec<_>>());
+            image::open(desk.path("p.png")).unwrap().to_rgb8()
+        });
+        let far =
+            |a: &image::Rgb<u8>, b: &image::Rgb<u8>| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 24);
+        let differing = gpu.pixels().zip(reference.pixels()).filter(|(a, b)| far(a, b)).count();
+        assert!(differing <= 160 * 90 / 100, "{aov}: {differing}");
+    }
 }
 
 #[test]

@@ -494,7 +494,10 @@ fn options_and_places_that_do_not_fit() {
         (&["--scenes", "missing"], "--scenes: missing is not a folder"),
         (&["--scenes", "file"], "--scenes: file is not a folder"),
         (&["--shadows", "lispsm@64"], "`lispsm@64` is given twice"),
-        (&["--backend", "gpu"], "--backend: gpu is not built"),
+        (
+            &["--backend", "gpu", "--shadows", "log"],
+            "--backend: no GPU rasterises the rows of `log`",
+        ),
     ] {
         refuses(&desk, &small("out", options), expected);
     }

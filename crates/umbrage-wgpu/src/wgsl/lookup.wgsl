@@ -217,7 +217,8 @@ fn shadow_map_visibility(map: u32, position: vec3f, normal: vec3f) -> f32 {
     let point = shadow_point(map, position);
     let size = shadow_maps[map].size;
     // What is served lies in the map up to rounding, at the border of its part as well.
-    let is_inside = all(point.texel >= vec2f(-0.5)) && all(point.texel <= size + 0.5);
+    let rounding = 1e-4 * size;
+    let is_inside = all(point.texel >= -rounding) && all(point.texel <= size + rounding);
     if (point.w <= 0.0 || !is_inside || point.depth < -SHADOW_ROUNDING) {
         return 1.0;
     }

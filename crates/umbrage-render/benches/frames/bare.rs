@@ -1,0 +1,193 @@
+//! A depth pass over a plan's first map as one writes it without any library: plain wgpu.
+
+use bytemuck::{bytes_of, cast_slice};
+use glam::{DMat4, Mat4, Vec3, Vec4};
+use std::ops::Range;
+use umbrage::Plan;
+use umbrage_render::Gpu;
+use umbrage_scene::Scene;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+const SHADER: &str = "
+    @group(0) @binding(0) var<uniform> clip_from_local: mat4x4f;
+
+    @vertex
+    fn vertex(
+        @location(0) position: vec3f,
+        @location(1) x: vec4f,
+        @location(2) y: vec4f,
+        @location(3) z: vec4f,
+    ) -> @builtin(position) vec4f {
+        let point = vec4f(position, 1.0);
+        return clip_from_local * vec4f(dot(x, point), dot(y, point), dot(z, point), 1.0);
+    }";
+
+/// What to draw, ready.
+pub(crate) struct BareDepth<'a> {
+    scene: &'a Scene,
+    view: wgpu::TextureView,
+    pipeline: wgpu::RenderPipeline,
+    group: wgpu::BindGroup,
+    matrix: wgpu::Buffer,
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    instances: wgpu::Buffer,
+    /// Indices, first vertex of each mesh.
+    meshes: Vec<(Range<u32>, i32)>,
+    boxes: Vec<umbrage::Aabb>,
+    by_mesh: Vec<usize>,
+}
+
+impl<'a> BareDepth<'a> {
+    pub(crate) fn new(gpu: &Gpu, scene: &'a Scene, plan: &Plan) -> Self {
+        let device = gpu.device();
+        let positions: Vec<Vec3> =
+            scene.meshes.iter().flat_map(|m| m.positions.iter().copied()).collect();
+        let indices: Vec<[u32; 3]> =
+            scene.meshes.iter().flat_map(|m| m.triangles.iter().copied()).collect();
+        let (mut index, mut vertex) = (0, 0);
+        let meshes = scene.meshes.iter().map(|m| {
+            let range = index..index + 3 * m.triangles.len() as u32;
+            index = range.end;
+            vertex += m.positions.len() as i32;
+            (range, vertex - m.positions.len() as i32)
+        });
+        let meshes = meshes.collect();
+        let buffer = |contents: &[u8], usage| {
+            device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
+        };
+        let matrix = buffer(
+            bytes_of(&Mat4::IDENTITY),
+            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        );
+        let instances = device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: 48 * scene.instances.len() as u64,
+            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+        });
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: None,
+                compilation_options: Default::default(),
+                buffers: &[
+                    Some(wgpu::VertexBufferLayout {
+                        array_stride: 12,
+                        step_mode: wgpu::VertexStepMode::Vertex,
+                        attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+                    }),
+                    Some(wgpu::VertexBufferLayout {
+                        array_stride: 48,
+                        step_mode: wgpu::VertexStepMode::Instance,
+                        attributes: &wgpu::vertex_attr_array![
+                            1 => Float32x4, 2 => Float32x4, 3 => Float32x4
+                        ],
+                    }),
+                ],
+            },
+            primitive: wgpu::PrimitiveState {
+                unclipped_depth: gpu.support().depth_clip_control,
+                ..Default::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Less),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: matrix.as_entire_binding() }],
+        });
+        let [width, height] = plan.maps[0].resolution;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Depth32Float,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        let mut by_mesh: Vec<usize> = (0..scene.instances.len()).collect();
+        by_mesh.sort_by_key(|&i| scene.instances[i].mesh);
+        Self {
+            scene,
+            view: texture.create_view(&Default::default()),
+            pipeline,
+            group,
+            matrix,
+            vertices: buffer(cast_slice(&positions), wgpu::BufferUsages::VERTEX),
+            indices: buffer(cast_slice(&indices), wgpu::BufferUsages::INDEX),
+            instances,
+            meshes,
+            boxes: scene.instance_boxes(),
+            by_mesh,
+        }
+    }
+
+    /// Draws the same triangles, culled alike, and submits.
+    pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan) {
+        let map = &plan.maps[0];
+        let ndc = DMat4::from_cols_array_2d(&[
+            [2.0, 0.0, 0.0, 0.0],
+            [0.0, -2.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [-1.0, 1.0, 0.0, 1.0],
+        ]);
+        let clip_from_local = (ndc * map.shadow_from_local).as_mat4();
+        gpu.queue().write_buffer(&self.matrix, 0, bytes_of(&clip_from_local));
+        let mut rows: Vec<[Vec4; 3]> = Vec::new();
+        let mut draws: Vec<(usize, Range<u32>)> = Vec::new();
+        for &i in self.by_mesh.iter().filter(|&&i| map.may_cast(self.boxes[i])) {
+            let instance = &self.scene.instances[i];
+            let m = instance.world_from_mesh;
+            let t = m.translation - plan.origin;
+            let at = rows.len() as u32;
+            rows.push([0, 1, 2].map(|r| m.matrix3.row(r).extend(t[r]).as_vec4()));
+            match draws.last_mut() {
+                Some((mesh, range)) if *mesh == instance.mesh => range.end = at + 1,
+                _ => draws.push((instance.mesh, at..at + 1)),
+            }
+        }
+        gpu.queue().write_buffer(&self.instances, 0, cast_slice(&rows));
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.group, &[]);
+        pass.set_vertex_buffer(0, self.vertices.slice(..));
+        pass.set_vertex_buffer(1, self.instances.slice(..));
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for (mesh, instances) in draws {
+            let (indices, first) = self.meshes[mesh].clone();
+            pass.draw_indexed(indices, first, instances);
+        }
+        drop(pass);
+        gpu.queue().submit([encoder.finish()]);
+    }
+}

@@ -1,0 +1,69 @@
+//! On a real device, lavapipe where there is no other. Without any these tests fail: `tools/setup` installs one.
+
+mod parity;
+mod pictures;
+mod trouble;
+
+use std::path::PathBuf;
+use std::sync::LazyLock;
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Plan, Planner};
+use umbrage_render::Gpu;
+use umbrage_scene::Scene;
+use umbrage_trace::Tracer;
+
+/// One device for all.
+pub(crate) static GPU: LazyLock<Gpu> =
+    LazyLock::new(|| Gpu::open().expect("a GPU, or a driver in software: run tools/setup"));
+
+/// A scene by name: a file of the shared scenes, or built in.
+pub(crate) fn scene(name: &str) -> Scene {
+    if !name.ends_with(".glb") {
+        let (name, size) = name.split_once(':').unwrap_or((name, ""));
+        return umbrage_scene::builtin(name, size.parse().ok()).unwrap();
+    }
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/scenes");
+    let folder = std::env::var_os("UMBRAGE_SCENES").map_or(PathBuf::from(default), PathBuf::from);
+    let path = folder.join(name);
+    assert!(
+        path.is_file(),
+        "{} is missing: these tests need the shared scenes; set UMBRAGE_SCENES to their folder",
+        path.display()
+    );
+    umbrage_scene::load(&path).unwrap()
+}
+
+/// A scene with its own view, ready for rays.
+pub(crate) struct Set<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) tracer: Tracer<'a>,
+    pub(crate) camera: Camera,
+    boxes: Vec<Aabb>,
+}
+
+impl<'a> Set<'a> {
+    pub(crate) fn new(scene: &'a Scene, image: [u32; 2]) -> Self {
+        let tracer = Tracer::new(scene).unwrap();
+        let v = scene.default_view();
+        let look = LookAt {
+            eye: v.eye,
+            target: v.target,
+            up: v.up,
+            fov_y_rad: v.fov_y_rad,
+            near: v.near,
+            far: v.far,
+            image,
+        };
+        let boxes = tracer.boxes(64);
+        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes }
+    }
+
+    pub(crate) fn light(&self) -> Light {
+        self.scene.default_light().light
+    }
+
+    pub(crate) fn plan(&self, lights: &[Light], options: &Options) -> Plan {
+        let bounds =
+            Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
+        Planner::new().plan(&self.camera, lights, &bounds, options).unwrap().clone()
+    }
+}

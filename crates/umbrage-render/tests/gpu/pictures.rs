@@ -1,0 +1,108 @@
+//! Frames and samples are of one picture, however it is cut.
+
+use crate::{GPU, Set, scene};
+use umbrage::{Options, Partition};
+use umbrage_render::{FrameTarget, Look, Renderer, SceneBuffers, Timer};
+use umbrage_trace::shade;
+use umbrage_wgpu::{Casters, ShadowOptions};
+use wgpu::{BufferUsages, MapMode, PollType};
+
+/// sRGB of a frame.
+fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
+    let (device, queue, texture) = (GPU.device(), GPU.queue(), target.color());
+    let bytes_per_row = (4 * texture.width()).next_multiple_of(256);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(bytes_per_row * texture.height()),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(bytes_per_row),
+        rows_per_image: None,
+    };
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let copy = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), copy, texture.size());
+    queue.submit([encoder.finish()]);
+    buffer.map_async(MapMode::Read, .., |_| {});
+    device.poll(PollType::wait_indefinitely()).unwrap();
+    let bytes: Vec<u8> = bytemuck::pod_collect_to_vec(&buffer.get_mapped_range(..).unwrap());
+    let rows = bytes.chunks(bytes_per_row as usize);
+    rows.flat_map(|row| {
+        let pixels = row.chunks(4).take(texture.width() as usize);
+        pixels.map(|p| [p[0], p[1], p[2]]).collect::<Vec<_>>()
+    })
+    .collect()
+}
+
+/// The shader's tone mapping and the texture's encoding are those of the reference's pictures.
+#[test]
+fn a_frame_looks_as_its_samples_do() {
+    let scene = scene("town:20");
+    let set = Set::new(&scene, [301, 170]);
+    let light = set.light();
+    let plan = set.plan(&[light], &Options::default());
+    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    let timer = Timer::new(&GPU).expect("timestamps");
+    let drawn = renderer.draw_maps(&plan, Casters::Still, Some(&timer)).unwrap();
+    assert!(drawn[0].1.triangles > 1000 && drawn[0].1.draws > 0, "{drawn:?}");
+    let target = FrameTarget::new(&GPU, set.camera.image()).unwrap();
+    renderer.frame(&look, &target, Some(&timer)).unwrap();
+    let [depth, shade_ms] = timer.read(&GPU).unwrap();
+    assert!(depth > 0.0 && shade_ms > 0.0 && depth + shade_ms < 60e3, "{depth} {shade_ms}");
+    let samples = renderer.samples(&look, 0..170, 1, false).unwrap();
+    let radiance: Vec<_> = samples.iter().map(|s| s.radiance).collect();
+    let far = |(a, b): &([u8; 3], [u8; 3])| (0..3).any(|i| a[i].abs_diff(b[i]) > 1);
+    let pairs = read(&target).into_iter().zip(shade::pixels(&radiance, 1));
+    assert_eq!(pairs.filter(far).count(), 0);
+    assert!(samples.iter().all(|s| s.map.is_none() && s.error.is_nan()), "not asked for");
+}
+
+/// Tiles, rows and grids only choose which samples there are.
+#[test]
+fn samples_are_those_of_a_larger_picture() {
+    let scene = scene("sphere");
+    let light = Set::new(&scene, [8, 8]).light();
+    let options = Options { partition: Partition::slices(2), ..Options::default() };
+    let coarse = Set::new(&scene, [700, 96]);
+    let plan = coarse.plan(&[light], &options);
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    renderer.draw_maps(&plan, Casters::Still, None).unwrap();
+    let look = Look { camera: &coarse.camera, light: &light, light_index: 0 };
+    // Twice 700 samples do not fit into one tile.
+    let samples = renderer.samples(&look, 40..70, 2, true).unwrap();
+    assert_eq!(samples.len(), 700 * 30 * 4);
+    let fine = Set::new(&scene, [1400, 192]);
+    let look = Look { camera: &fine.camera, light: &light, light_index: 0 };
+    let all = renderer.samples(&look, 0..192, 1, true).unwrap();
+    let mut differing = 0;
+    for (i, sample) in samples.iter().enumerate() {
+        let (pixel, within) = (i / 4, i % 4);
+        let [x, y] = [pixel % 700 * 2 + within % 2, (pixel / 700 + 40) * 2 + within / 2];
+        let other = all[y * 1400 + x];
+        differing += usize::from(
+            (sample.radiance - other.radiance).abs().max_element() > 2e-3
+                || sample.map != other.map,
+        );
+    }
+    assert!(differing * 500 < samples.len(), "{differing} of {}", samples.len());
+}
+
+/// What does not change is not drawn again, over the renderer too.
+#[test]
+fn still_maps_are_drawn_once() {
+    let scene = scene("fence");
+    let set = Set::new(&scene, [64, 36]);
+    let light = set.light();
+    let options = Options { partition: Partition::slices(3), ..Options::default() };
+    let plan = set.plan(&[light], &options);
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    let mut drawn = |casters| renderer.draw_maps(&plan, casters, None).unwrap().len();
+    assert_eq!([drawn(Casters::Still), drawn(Casters::Still), drawn(Casters::Moved)], [3, 0, 3]);
+}

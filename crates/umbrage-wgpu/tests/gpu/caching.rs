@@ -1,0 +1,174 @@
+//! What is drawn again, and what is not.
+
+use crate::device::Bench;
+use crate::{EYE, bench, camera, lights, plan, sun};
+use glam::DVec3;
+use umbrage::{Aabb, Options, Partition, Plan, Planner, Size, Warp};
+use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows};
+
+fn shadows(bench: &Bench, layout: Layout) -> Shadows {
+    let options = ShadowOptions { layout, ..ShadowOptions::default() };
+    Shadows::new(&bench.device, bench.support, &options).unwrap()
+}
+
+fn options() -> Options {
+    Options { partition: Partition::slices(3), size: Size::Budget(128 * 128), ..Options::default() }
+}
+
+/// Which maps a frame draws.
+fn drawn(bench: &Bench, shadows: &mut Shadows, plan: &Plan, casters: Casters<'_>) -> Vec<usize> {
+    let frame = Frame { plan, render_origin: plan.origin, casters };
+    let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
+    let stale: Vec<usize> = prepared.stale().collect();
+    let mut encoder = bench.encoder();
+    let mut drawn = Vec::new();
+    let count = prepared.encode(&mut encoder, None, |map| drawn.push(map.index));
+    assert_eq!((count, &stale), (drawn.len(), &drawn));
+    bench.finish(encoder);
+    drawn
+}
+
+#[test]
+fn what_stands_still_is_drawn_once() {
+    let bench = bench();
+    for layout in [Layout::Atlas, Layout::Layers] {
+        let mut shadows = shadows(&bench, layout);
+        let plan = plan(&camera(EYE), &[sun()], &options());
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0; 0]);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Moved), [0, 1, 2]);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0; 0]);
+        let moved = self::plan(&camera(EYE + DVec3::X * 0.1), &[sun()], &options());
+        assert_eq!(drawn(&bench, &mut shadows, &moved, Casters::Still), [0, 1, 2]);
+    }
+}
+
+#[test]
+fn what_moves_is_drawn_into_the_maps_it_casts_into() {
+    let bench = bench();
+    for layout in [Layout::Atlas, Layout::Layers] {
+        let mut shadows = shadows(&bench, layout);
+        let plan = plan(&camera(EYE), &[sun()], &options());
+        drawn(&bench, &mut shadows, &plan, Casters::Still);
+        let around = |p: DVec3| Aabb::around([p - DVec3::splat(0.01), p + DVec3::splat(0.01)]);
+        // Before the last slice's ground, and out of the way of all.
+        let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
+        let into: Vec<usize> = (0..3).filter(|&i| plan.maps[i].may_cast(around(far))).collect();
+        assert!(!into.is_empty() && into.len() < 3, "{into:?}");
+        let boxes = [around(far)];
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::MovedIn(&boxes)), into);
+        let away = [around(DVec3::new(0.0, -500.0, 0.0))];
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::MovedIn(&away)), [0; 0]);
+    }
+}
+
+#[test]
+fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
+    let bench = bench();
+    let mut shadows = shadows(&bench, Layout::Atlas);
+    let plan = plan(&camera(EYE), &[sun()], &options());
+    let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
+    drop(shadows.prepare(&bench.device, &bench.queue, &frame).unwrap());
+    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
+}
+
+/// Redrawing one map of an atlas clears that map and leaves the others.
+#[test]
+fn a_map_that_is_redrawn_leaves_its_neighbours() {
+    let bench = bench();
+    let mut shadows = shadows(&bench, Layout::Atlas);
+    let plan = plan(&camera(EYE), &[sun()], &options());
+    let own = bench.own_casters(
+        &shadows,
+        "@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+            let unused = shadow_caster_clip(vec3f(0.0)) * 0.0;
+            return vec4f(f32((i << 1u) & 2u) * 2.0 - 1.0, f32(i & 2u) * 2.0 - 1.0, 0.25, 1.0) + unused;
+        }
+        @fragment fn fragment() {}",
+    );
+    let mut frame = |casters, draws: bool| {
+        let frame = Frame { plan: &plan, render_origin: plan.origin, casters };
+        let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
+        let mut encoder = bench.encoder();
+        prepared.encode(&mut encoder, None, |map| {
+            map.pass.set_pipeline(&own);
+            if draws {
+                map.pass.draw(0..3, 0..1);
+            }
+        });
+        bench.finish(encoder);
+        let (depths, width) = bench.depths(&shadows, 0);
+        [0, 1, 2].map(|i| {
+            let place = shadows.place(i).unwrap();
+            let rows = place.origin[1]..place.origin[1] + place.size[1];
+            let texels = rows.flat_map(|y| {
+                let row = y as usize * width;
+                let columns = place.origin[0]..place.origin[0] + place.size[0];
+                columns.map(move |x| row + x as usize)
+            });
+            let values: Vec<f32> = texels.map(|t| depths[t]).collect();
+            assert!(values.iter().all(|&v| v == values[0]), "map {i} is of one depth");
+            values[0]
+        })
+    };
+    assert_eq!(frame(Casters::Still, true), [0.25; 3]);
+    let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
+    let boxes = [Aabb::around([far])];
+    let expected = [0, 1, 2].map(|i| if plan.maps[i].may_cast(boxes[0]) { 1.0 } else { 0.25 });
+    assert!(expected.contains(&0.25) && expected.contains(&1.0));
+    assert_eq!(frame(Casters::MovedIn(&boxes), false), expected);
+}
+
+/// Ever other views: sizes change all the time, and what moves the texture is drawn anew.
+#[test]
+fn a_camera_that_wanders_needs_few_textures() {
+    let bench = bench();
+    let mut shadows = shadows(&bench, Layout::Atlas);
+    let mut planner = Planner::new();
+    let mut textures = std::collections::HashSet::new();
+    for i in 0..120 {
+        let angle = f64::from(i) * 0.05;
+        let eye = EYE + DVec3::new(angle.sin() * 6.0, 1.0 + angle.cos(), angle * 0.5);
+        let bounds = umbrage::Bounds::of_scene(crate::scene());
+        let options = Options { warp: Warp::Lispsm, ..options() };
+        let plan = planner.plan(&camera(eye), &lights()[..2], &bounds, &options).unwrap();
+        let frame = Frame { plan, render_origin: plan.origin, casters: Casters::Still };
+        let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
+        let mut encoder = bench.encoder();
+        prepared.encode(&mut encoder, None, |_| {});
+        bench.finish(encoder);
+        for (i, map) in plan.maps.iter().enumerate() {
+            assert_eq!(
+                shadows.place(i).map(|p| p.size),
+                (!map.is_empty()).then_some(map.resolution)
+            );
+        }
+        textures.insert(shadows.depth_texture().clone());
+    }
+    assert!(textures.len() < 20, "{}", textures.len());
+    assert!(shadows.texture_bytes() < 4 * 4 * 128 * 128 * 2, "{}", shadows.texture_bytes());
+}
+
+/// A camera that sees nothing gets no maps, no pass, and full light; then it sees again.
+#[test]
+fn empty_maps_cost_nothing() {
+    let bench = bench();
+    let mut shadows = shadows(&bench, Layout::Atlas);
+    let up = umbrage::Camera::look_at(umbrage::LookAt {
+        eye: EYE + DVec3::Y * 20.0,
+        target: EYE + DVec3::Y * 40.0,
+        up: DVec3::X,
+        fov_y_rad: 0.5,
+        near: 0.1,
+        far: 60.0,
+        image: [64, 64],
+    })
+    .unwrap();
+    let nothing = plan(&up, &[sun()], &options());
+    assert!(nothing.maps.iter().all(umbrage::ShadowMap::is_empty));
+    assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Moved), [0; 0]);
+    assert_eq!(shadows.texture_bytes(), 4);
+    let plan = plan(&camera(EYE), &[sun()], &options());
+    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
+    assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Still), [0; 0]);
+}

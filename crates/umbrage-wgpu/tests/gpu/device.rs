@@ -1,0 +1,203 @@
+//! A device that tells of every complaint.
+
+use bytemuck::{Pod, bytes_of};
+use std::sync::{Arc, Mutex};
+use umbrage_wgpu::{CasterInstance, Shadows, Support};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{BufferUsages, Device, Queue, RenderPipeline};
+
+pub(crate) struct Bench {
+    pub(crate) device: Device,
+    pub(crate) queue: Queue,
+    pub(crate) support: Support,
+    complaints: Arc<Mutex<Vec<String>>>,
+}
+
+impl Bench {
+    pub(crate) fn open() -> Self {
+        let instance = wgpu::Instance::default();
+        let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
+            .expect("a GPU, or a driver in software: run tools/setup");
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            required_features: adapter.features() & Support::WANTED_FEATURES,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .unwrap();
+        let support = Support::new(&adapter, &device).unwrap();
+        let complaints = Arc::new(Mutex::new(Vec::new()));
+        let told = Arc::clone(&complaints);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            told.lock().unwrap().push(error.to_string());
+        }));
+        Self { device, queue, support, complaints }
+    }
+
+    /// Waits until all is done; fails if wgpu found anything wrong.
+    pub(crate) fn finish(&self, encoder: wgpu::CommandEncoder) {
+        self.queue.submit([encoder.finish()]);
+        self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        let complaints = self.complaints.lock().unwrap();
+        assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    }
+
+    pub(crate) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&Default::default())
+    }
+
+    pub(crate) fn buffer(&self, contents: &[u8], usage: BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
+    }
+
+    /// Runs `wgsl`'s entry point `main` on a list of inputs, one invocation each in groups of 64: binding 0 of group 1 is
+    /// the input, binding 1 the output. Group 0 is the lookup's.
+    pub(crate) fn compute<I: Pod, O: Pod>(
+        &self,
+        shadows: &Shadows,
+        wgsl: &str,
+        inputs: &[I],
+    ) -> Vec<O> {
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl((shadows.lookup_wgsl(0) + wgsl).into()),
+        });
+        let entry = |binding, read_only| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let own = self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: None,
+            entries: &[entry(0, true), entry(1, false)],
+        });
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(shadows.lookup_layout()), Some(&own)],
+            immediate_size: 0,
+        });
+        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: None,
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let input = self.buffer(bytemuck::cast_slice(inputs), BufferUsages::STORAGE);
+        let size = (size_of::<O>() * inputs.len()) as u64;
+        let buffer = |usage| {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+        let readback = buffer(BufferUsages::COPY_DST | BufferUsages::MAP_READ);
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &own,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: input.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: output.as_entire_binding() },
+            ],
+        });
+        let mut encoder = self.encoder();
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, shadows.lookup_bind_group(), &[]);
+        pass.set_bind_group(1, &group, &[]);
+        pass.dispatch_workgroups((inputs.len() as u32).div_ceil(64), 1, 1);
+        drop(pass);
+        encoder.copy_buffer_to_buffer(&output, 0, &readback, 0, size);
+        self.finish(encoder);
+        self.read(&readback)
+    }
+
+    fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
+        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        bytemuck::pod_collect_to_vec(&buffer.get_mapped_range(..).unwrap())
+    }
+
+    /// Depths of a layer of the shadows' texture, row by row, and its width.
+    pub(crate) fn depths(&self, shadows: &Shadows, layer: u32) -> (Vec<f32>, usize) {
+        let texture = shadows.depth_texture();
+        let [width, height] = [texture.width(), texture.height()];
+        let bytes_per_row = (4 * width).next_multiple_of(256);
+        let readback = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(bytes_per_row * height),
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.encoder();
+        encoder.copy_texture_to_buffer(
+            wgpu::TexelCopyTextureInfo {
+                texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                aspect: wgpu::TextureAspect::DepthOnly,
+            },
+            wgpu::TexelCopyBufferInfo {
+                buffer: &readback,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(bytes_per_row),
+                    rows_per_image: None,
+                },
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        self.finish(encoder);
+        let padded: Vec<f32> = self.read(&readback);
+        let row = (bytes_per_row / 4) as usize;
+        let rows = padded.chunks(row).flat_map(|r| r[..width as usize].iter().copied());
+        (rows.collect(), width as usize)
+    }
+
+    /// A pipeline of the user's own that draws casters: `wgsl` behind the casters' module in group 0, without vertex buffers.
+    pub(crate) fn own_casters(&self, shadows: &Shadows, wgsl: &str) -> RenderPipeline {
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl((shadows.caster_wgsl(0) + wgsl).into()),
+        });
+        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(shadows.caster_layout())],
+            immediate_size: 0,
+        });
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: None,
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: None,
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: shadows.primitive_state(),
+            depth_stencil: Some(shadows.depth_stencil_state()),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: None,
+                compilation_options: Default::default(),
+                targets: &[],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+
+    /// A vertex buffer of one instance.
+    pub(crate) fn instance(&self, instance: CasterInstance) -> wgpu::Buffer {
+        self.buffer(bytes_of(&instance), BufferUsages::VERTEX)
+    }
+}

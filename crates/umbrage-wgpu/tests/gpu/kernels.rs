@@ -1,0 +1,323 @@
+//! The shaders' functions against the Rust ones, on tables of inputs.
+
+use crate::device::Bench;
+use crate::{EYE, bench, camera, lights, plan, scene};
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec2, Vec3};
+use umbrage::visibility::{Filter, texel_coordinates, visibility};
+use umbrage::{Faces, Objective, Options, Partition, Plan, Size, Splits, Warp};
+use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows};
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Point {
+    position: Vec3,
+    light: u32,
+    normal: Vec3,
+    map: u32,
+}
+
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Receiver {
+    texel: Vec2,
+    slope: Vec2,
+    depth: f32,
+    slack: f32,
+    weight: f32,
+    padding: f32,
+}
+
+const POINT: &str = "
+struct Point { position: vec3f, light: u32, normal: vec3f, map: u32 }
+@group(1) @binding(0) var<storage, read> points: array<Point>;
+";
+
+/// Numbers without a pattern, 0 to 1: the hash of O'Neill's PCG output (Jarzynski and Olano 2020), which WGSL computes too.
+fn hash(x: u32) -> u32 {
+    let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+fn unit(x: u32) -> f64 {
+    f64::from(hash(x) >> 8) / f64::from(1 << 24)
+}
+
+const HASH: &str = "
+fn pcg(x: u32) -> u32 {
+    let state = x * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}
+";
+
+/// Points where receivers may be, seen and unseen, with normals to all sides.
+fn points(plan: &Plan, count: usize) -> Vec<(DVec3, DVec3)> {
+    let camera = camera(EYE);
+    let is_receiver = |p: DVec3| p.clamp(scene().min, scene().max) == p;
+    (0..)
+        .map(|i| {
+            let at = |k: u32| unit(i * 8 + k);
+            let pixel = glam::DVec2::new(at(0) * 700.0 - 30.0, at(1) * 420.0 - 30.0);
+            let depth = 0.1 * (at(2) * (700f64).ln()).exp();
+            let normal = DVec3::new(at(3) - 0.5, at(4) - 0.5, at(5) - 0.5);
+            (plan.origin + camera.ray(pixel) * depth, normal)
+        })
+        .filter(|&(p, _)| is_receiver(p))
+        .take(count)
+        .collect()
+}
+
+fn options(warp: Warp, partition: Partition) -> Options {
+    Options { warp, partition, size: Size::Budget(256 * 256), ..Options::default() }
+}
+
+fn techniques() -> Vec<Options> {
+    let faces = Partition { faces: Faces::SidesAndNear, ..Partition::default() };
+    let fading = Partition { overlap: 0.3, splits: Splits::Fitted, ..Partition::slices(3) };
+    vec![
+        options(Warp::Unfocused, Partition::default()),
+        options(Warp::Uniform, Partition::slices(4)),
+        options(Warp::Stable, Partition::slices(2)),
+        options(Warp::Psm, Partition::default()),
+        options(Warp::Lispsm, faces),
+        options(Warp::Tsm { focus: None }, fading),
+        options(Warp::Adaptive(Objective::Area), Partition::slices(2)),
+        options(Warp::Lambda(3.0), Partition::default()),
+    ]
+}
+
+/// Shadows whose texels hold depths without a pattern, in the gutters as well.
+fn random_depths(
+    bench: &Bench,
+    shadow_options: &ShadowOptions,
+    plan: &Plan,
+    origin: DVec3,
+) -> Shadows {
+    let mut shadows = Shadows::new(&bench.device, bench.support, shadow_options).unwrap();
+    let pipeline = bench.own_casters(
+        &shadows,
+        &format!(
+            "{HASH}
+            @vertex
+            fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{
+                // The map's matrix is not needed, but is there.
+                let unused = shadow_caster_clip(vec3f(0.0)) * 0.0;
+                return vec4f(f32((i << 1u) & 2u) * 2.0 - 1.0, f32(i & 2u) * 2.0 - 1.0, 0.0, 1.0) + unused;
+            }}
+            @fragment
+            fn fragment(@builtin(position) at: vec4f) -> @builtin(frag_depth) f32 {{
+                return f32(pcg(u32(at.x) + 16384u * u32(at.y)) >> 8u) / 16777216.0;
+            }}"
+        ),
+    );
+    let frame = Frame { plan, render_origin: origin, casters: Casters::Moved };
+    let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
+    let mut encoder = bench.encoder();
+    prepared.encode(&mut encoder, None, |map| {
+        map.pass.set_pipeline(&pipeline);
+        map.pass.draw(0..3, 0..1);
+    });
+    bench.finish(encoder);
+    shadows
+}
+
+/// What the Rust functions say of the same depths.
+fn expected(shadows: &Shadows, plan: &Plan, light: usize, p: DVec3, n: DVec3) -> f64 {
+    let filter = shadows.options().filter;
+    let (mut sum, mut shares) = (0.0, 0.0);
+    for (index, share) in plan.lookup(light, p) {
+        let map = &plan.maps[index];
+        let place = shadows.place(index).unwrap();
+        let value = map.receiver(p, n).map_or(1.0, |r| {
+            visibility(map, filter, &r, |i, j| {
+                let [x, y] = [(place.origin[0], i), (place.origin[1], j)]
+                    .map(|(o, i)| o.checked_add_signed(i).unwrap());
+                unit(x + 16384 * y) as f32
+            })
+        });
+        sum += share * f64::from(value);
+        shares += share;
+    }
+    if shares > 0.0 { sum / shares } else { 1.0 }
+}
+
+const VISIBILITY: &str = "
+@group(1) @binding(1) var<storage, read_write> out: array<f32>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (id.x < arrayLength(&points)) {
+        let p = points[id.x];
+        out[id.x] = shadow_visibility(p.light, p.position, p.normal);
+    }
+}";
+
+/// Depths without a pattern make every texel count: whoever looks one texel beside, or mixes up rows, layers, gutters or
+/// weights, is found out. What is left are points on the border of a texel, to single precision.
+fn agrees(shadow_options: &ShadowOptions, options: &Options, origin: Option<DVec3>) {
+    let bench = bench();
+    let lights = lights();
+    let lights = if options.partition.faces == Faces::Whole { &lights[..] } else { &lights[..1] };
+    let plan = plan(&camera(EYE), lights, options);
+    let origin = origin.unwrap_or(plan.origin);
+    let shadows = random_depths(&bench, shadow_options, &plan, origin);
+    let table = points(&plan, 3000);
+    let mut served = 0;
+    let mut wrong = 0;
+    for light in 0..lights.len() {
+        let inputs: Vec<Point> = table
+            .iter()
+            .map(|&(p, n)| Point {
+                position: (p - origin).as_vec3(),
+                light: light as u32,
+                normal: n.as_vec3(),
+                map: 0,
+            })
+            .collect();
+        let outputs: Vec<f32> = bench.compute(&shadows, &format!("{POINT}{VISIBILITY}"), &inputs);
+        for (&(p, n), out) in table.iter().zip(outputs) {
+            served += usize::from(plan.lookup(light, p).next().is_some());
+            let expected = expected(&shadows, &plan, light, p, n);
+            assert!((0.0..=1.0).contains(&out), "{p}: {out}");
+            wrong += usize::from((f64::from(out) - expected).abs() > 2e-3);
+        }
+    }
+    assert!(served > 800, "{options:?}: {served}");
+    assert!(wrong * 500 <= served, "{shadow_options:?} {options:?}: {wrong} of {served}");
+}
+
+#[test]
+fn every_technique_is_looked_up_as_in_rust() {
+    for options in techniques() {
+        agrees(&ShadowOptions::default(), &options, None);
+    }
+}
+
+#[test]
+fn every_filter_and_layout_is_looked_up_as_in_rust() {
+    let options = options(Warp::Lispsm, Partition::slices(2));
+    for layout in [Layout::Atlas, Layout::Layers] {
+        for n in [1, 2, 3, 5, 8, 15] {
+            let filter = Filter::pcf(n).unwrap();
+            agrees(&ShadowOptions { filter, layout, ..Default::default() }, &options, None);
+        }
+        let hard = ShadowOptions { layout, ..Default::default() };
+        agrees(&hard, &options, None);
+        // The nearest texel alone has one depth to compare with, whoever compares.
+        agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &options, None);
+    }
+}
+
+#[test]
+fn render_space_may_begin_anywhere_near() {
+    let options = options(Warp::Lispsm, Partition::slices(2));
+    agrees(&ShadowOptions::default(), &options, Some(DVec3::ZERO));
+    agrees(&ShadowOptions::default(), &options, Some(EYE + DVec3::new(-20.0, 3.0, 11.0)));
+}
+
+/// On receivers that face the light all texels are compared with one depth, so that bilinear comparisons have to give the same
+/// as single ones, but for the eight bits or so that texture units have for weights.
+#[test]
+fn hardware_comparisons_weigh_as_single_ones_do() {
+    let bench = bench();
+    let options = options(Warp::Uniform, Partition::default());
+    let plan = plan(&camera(EYE), &lights()[..1], &options);
+    let towards = -DVec3::new(0.5, -1.0, 0.25);
+    for n in [1, 2, 3, 4, 7] {
+        let filter = Filter::pcf(n).unwrap();
+        let shadow_options =
+            ShadowOptions { filter, comparison: Comparison::Hardware, ..Default::default() };
+        let shadows = random_depths(&bench, &shadow_options, &plan, plan.origin);
+        let table = points(&plan, 2000);
+        let inputs: Vec<Point> = table
+            .iter()
+            .map(|&(p, _)| Point {
+                position: (p - plan.origin).as_vec3(),
+                light: 0,
+                normal: towards.as_vec3(),
+                map: 0,
+            })
+            .collect();
+        let outputs: Vec<f32> = bench.compute(&shadows, &format!("{POINT}{VISIBILITY}"), &inputs);
+        let mut wrong = 0;
+        for (&(p, _), out) in table.iter().zip(outputs) {
+            let expected = expected(&shadows, &plan, 0, p, towards);
+            wrong += usize::from((f64::from(out) - expected).abs() > 0.02);
+        }
+        assert!(wrong <= 4, "pcf{n}: {wrong}");
+    }
+}
+
+const RECEIVER: &str = "
+struct Out { texel: vec2f, slope: vec2f, depth: f32, slack: f32, weight: f32, padding: f32 }
+@group(1) @binding(1) var<storage, read_write> out: array<Out>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if (id.x < arrayLength(&points)) {
+        let p = points[id.x];
+        let r = shadow_receiver(shadow_point(p.map, p.position), p.normal);
+        out[id.x] = Out(r.texel, r.slope, r.depth, r.slack, shadow_weight(p.map, p.position), 0.0);
+    }
+}";
+
+#[test]
+fn receivers_and_weights_are_those_of_rust() {
+    let bench = bench();
+    let extra = Bias { texels: 0.25, metres: 0.01 };
+    for options in techniques() {
+        let plan = plan(&camera(EYE), &lights()[..2], &options);
+        let mut shadows =
+            Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();
+        let mut compared = 0;
+        for bias in [Bias::default(), extra] {
+            shadows.set_bias(bias).unwrap();
+            let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Still };
+            drop(shadows.prepare(&bench.device, &bench.queue, &frame).unwrap());
+            // Empty maps are left out of what shaders see.
+            let full = plan.maps.iter().filter(|m| !m.is_empty());
+            for (index, map) in full.enumerate() {
+                let table = points(&plan, 400);
+                let inputs: Vec<Point> = table
+                    .iter()
+                    .map(|&(p, n)| Point {
+                        position: (p - plan.origin).as_vec3(),
+                        light: 0,
+                        normal: n.as_vec3(),
+                        map: index as u32,
+                    })
+                    .collect();
+                let outputs: Vec<Receiver> =
+                    bench.compute(&shadows, &format!("{POINT}{RECEIVER}"), &inputs);
+                for (&(p, n), out) in table.iter().zip(outputs) {
+                    let weight = map.weight(p);
+                    let Some(r) = map.receiver(p, n).filter(|_| weight > 0.0) else { continue };
+                    compared += 1;
+                    let size = glam::UVec2::from(map.resolution).as_dvec2();
+                    let texel = texel_coordinates(map, r.st);
+                    assert!((out.texel.as_dvec2() - texel).length() < 2e-3, "{out:?} {texel}");
+                    assert!((f64::from(out.depth) - r.depth).abs() < 2e-6, "{out:?} {r:?}");
+                    assert!((f64::from(out.weight) - weight).abs() < 2e-3, "{out:?} {weight}");
+                    let slope =
+                        (r.slope / size).clamp(glam::DVec2::splat(-8.0), glam::DVec2::splat(8.0));
+                    let error = (out.slope.as_dvec2() - slope).length();
+                    assert!(error < 2e-3 * slope.length() + 1e-5, "{out:?} {slope}");
+                    let metre = 1e-2 * depth_per_metre(map, p);
+                    let slack = r.half_texel * if bias == extra { 1.5 } else { 1.0 }
+                        + if bias == extra { metre } else { 0.0 };
+                    let error = (f64::from(out.slack) - slack).abs();
+                    assert!(error < 1e-3 * slack + 1e-6, "{out:?} {slack}");
+                }
+            }
+        }
+        assert!(compared > 300, "{options:?}: {compared}");
+    }
+}
+
+/// By finite differences along the beam.
+fn depth_per_metre(map: &umbrage::ShadowMap, p: DVec3) -> f64 {
+    let st = map.project(p).unwrap().truncate();
+    let direction = map.beam(st).unwrap().direction;
+    let depth = |t: f64| map.project(p + direction * t).unwrap().z;
+    (depth(1e-4) - depth(-1e-4)) / 2e-4
+}

@@ -1,0 +1,80 @@
+//! What cannot be done is said, and nothing panics.
+
+use crate::device::Bench;
+use crate::{EYE, bench, camera, lights, plan, sun};
+use glam::DVec3;
+use umbrage::visibility::Filter;
+use umbrage::{Faces, Options, Partition, Size, Warp};
+use umbrage_wgpu::{Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support};
+
+fn prepare(
+    bench: &Bench,
+    shadows: &mut Shadows,
+    options: &Options,
+    origin: DVec3,
+) -> Result<(), Error> {
+    let plan = plan(&camera(EYE), &lights(), options);
+    let frame = Frame { plan: &plan, render_origin: origin, casters: Casters::Still };
+    shadows.prepare(&bench.device, &bench.queue, &frame).map(drop)
+}
+
+#[test]
+fn input_that_makes_no_sense_is_named() {
+    let bench = bench();
+    let new = |options: &ShadowOptions| Shadows::new(&bench.device, bench.support, options);
+    let error = new(&ShadowOptions { filter: Filter::Pcf { n: 99 }, ..Default::default() });
+    assert!(error.unwrap_err().to_string().starts_with("options.filter"));
+    let mut shadows = new(&ShadowOptions::default()).unwrap();
+    for bias in [
+        Bias { texels: f32::NAN, metres: 0.0 },
+        Bias { texels: -0.6, metres: 0.0 },
+        Bias { texels: 0.0, metres: f32::INFINITY },
+    ] {
+        assert!(shadows.set_bias(bias).unwrap_err().to_string().starts_with("bias"));
+    }
+    let small = Options { size: Size::Budget(64 * 64), ..Options::default() };
+    let error = prepare(&bench, &mut shadows, &small, DVec3::NAN).unwrap_err();
+    assert!(error.to_string().starts_with("frame.render_origin"), "{error}");
+    let log = Options { warp: Warp::Log, ..small };
+    let error = prepare(&bench, &mut shadows, &log, DVec3::ZERO).unwrap_err();
+    assert_eq!(error, Error::LogarithmicRows { map: 0 });
+    // And all is as it was.
+    prepare(&bench, &mut shadows, &small, DVec3::ZERO).unwrap();
+}
+
+#[test]
+fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
+    let bench = bench();
+    let small = Support { storage_buffers: false, max_side: 512, max_layers: 4, ..bench.support };
+    let mut shadows = Shadows::new(&bench.device, small, &ShadowOptions::default()).unwrap();
+    let faces = Partition { faces: Faces::SidesAndNear, ..Partition::slices(16) };
+    let many = Options { partition: faces, size: Size::Exact([2, 2]), ..Options::default() };
+    let error = prepare(&bench, &mut shadows, &many, DVec3::ZERO).unwrap_err();
+    assert!(matches!(error, Error::TooMany { .. }), "{error}");
+    let large = Options { size: Size::Exact([600, 2]), ..Options::default() };
+    let error = prepare(&bench, &mut shadows, &large, DVec3::ZERO).unwrap_err();
+    assert!(matches!(error, Error::NoRoom(_)), "{error}");
+    let layers = ShadowOptions { layout: Layout::Layers, ..ShadowOptions::default() };
+    let mut shadows = Shadows::new(&bench.device, small, &layers).unwrap();
+    let six = Options { size: Size::Exact([8, 8]), ..Options::default() };
+    let error = prepare(&bench, &mut shadows, &six, DVec3::ZERO).unwrap_err();
+    assert!(error.to_string().contains("do not fit into 4 layers"), "{error}");
+}
+
+/// On a device that is gone there is nothing to see, but nobody panics.
+#[test]
+fn a_lost_device_does_not_panic() {
+    let bench = bench();
+    let mut shadows =
+        Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();
+    let plan = plan(&camera(EYE), &[sun()], &Options::default());
+    bench.device.destroy();
+    for _ in 0..2 {
+        let frame = Frame { plan: &plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
+        let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
+        let mut encoder = bench.encoder();
+        prepared.encode(&mut encoder, None, |_| {});
+        bench.queue.submit([encoder.finish()]);
+    }
+    Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();
+}
