@@ -162,6 +162,10 @@ const ATTRIBUTES: VertexBufferLayout<'static> = VertexBufferLayout {
     ],
 };
 
+/// What masked casters need of them.
+const UVS: VertexBufferLayout<'static> =
+    VertexBufferLayout { attributes: ATTRIBUTES.attributes.split_at(1).0, ..ATTRIBUTES };
+
 impl<'g, 's> Renderer<'g, 's> {
     /// A renderer whose shadow maps are looked up as `options` say.
     ///
@@ -198,7 +202,7 @@ impl<'g, 's> Renderer<'g, 's> {
             device,
             &shadows,
             MeshKind::Masked,
-            &[positions, instances, Some(ATTRIBUTES)],
+            &[positions, instances, Some(UVS)],
         );
         let masks = scene.materials.iter().map(|m| {
             let mask = m.mask.as_ref()?;

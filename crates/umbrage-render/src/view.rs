@@ -137,7 +137,32 @@ impl ViewUniform {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::mem::offset_of;
     use umbrage::LookAt;
+
+    #[test]
+    fn the_shader_reads_what_is_written() {
+        let text = include_str!("wgsl/forward.wgsl");
+        let end = text.find("const DIRECTIONAL").expect("the struct ends before it");
+        let module = naga::front::wgsl::parse_str(&text[..end]).unwrap();
+        let (_, view) =
+            module.types.iter().find(|(_, t)| t.name.as_deref() == Some("View")).unwrap();
+        let naga::TypeInner::Struct { members, span } = &view.inner else { panic!("a struct") };
+        macro_rules! offsets {
+            ($($field:ident)*) => {
+                vec![$((stringify!($field), offset_of!(ViewUniform, $field))),*]
+            };
+        }
+        let ours = offsets![
+            clip_from_render ray grid ray_x light_kind ray_y light_range forward light_cosine
+            light_direction light_index light_position padding sun sky_light ground_light zenith
+            horizon nadir glow
+        ];
+        let theirs: Vec<_> =
+            members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+        assert_eq!(theirs, ours);
+        assert_eq!(*span as usize, size_of::<ViewUniform>());
+    }
 
     #[test]
     fn points_land_on_their_samples() {

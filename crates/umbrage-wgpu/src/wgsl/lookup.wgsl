@@ -82,22 +82,42 @@ fn shadow_visibility(light: u32, position: vec3f, normal: vec3f) -> f32 {
     if (light >= shadow_settings.light_count) {
         return 1.0;
     }
+    // First which maps, then what they say, so that neighbouring points of different slices are filtered together.
     let maps = shadow_lights[light];
     var left = 1.0;
-    var sum = 0.0;
+    var map = SHADOW_NONE;
+    var share = 0.0;
+    // Where slices overlap.
+    var next = SHADOW_NONE;
+    var next_share = 0.0;
     for (var i = 0u; i < maps.map_count; i++) {
-        let map = maps.first_map + i;
-        let share = min(shadow_weight(map, position), left);
-        if (share > 0.0) {
-            sum += share * shadow_map_visibility(map, position, normal);
-            left -= share;
+        let weight = min(shadow_weight(maps.first_map + i, position), left);
+        if (weight > 0.0) {
+            if (map == SHADOW_NONE) {
+                map = maps.first_map + i;
+                share = weight;
+            } else {
+                next = maps.first_map + i;
+                next_share += weight;
+            }
+            left -= weight;
             if (left <= 0.0) {
                 break;
             }
         }
     }
-    if (left >= 1.0) {
+    if (map == SHADOW_NONE) {
         return 1.0;
+    }
+    var sum = 0.0;
+    loop {
+        sum += share * shadow_map_visibility(map, position, normal);
+        if (next == SHADOW_NONE) {
+            break;
+        }
+        map = next;
+        share = next_share;
+        next = SHADOW_NONE;
     }
     return sum / (1.0 - left);
 }
