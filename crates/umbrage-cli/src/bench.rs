@@ -7,6 +7,7 @@ use crate::output::{aligned, print};
 use crate::pixels::{casters, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
+use crate::spec::Technique;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -94,6 +95,7 @@ impl Spread {
 
 /// A technique at work.
 struct Contender<'a> {
+    technique: &'a Technique,
     bencher: Bencher<'a>,
     planner: Planner,
     frames: Vec<Frame>,
@@ -124,14 +126,19 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let mut contenders = Vec::new();
     for technique in &args.shadows {
         let bencher = sets.bencher(technique, camera.image())?;
-        contenders.push(Contender { bencher, planner: Planner::new(), frames: Vec::new() });
+        contenders.push(Contender {
+            technique,
+            bencher,
+            planner: Planner::new(),
+            frames: Vec::new(),
+        });
     }
     for index in 0..frames {
         // Whoever comes first in a frame does not always do so.
         let first = index as usize % contenders.len();
         contenders.rotate_left(first);
         for contender in &mut contenders {
-            let technique = contender.bencher.technique();
+            let technique = contender.technique;
             progress.stage(technique.spec.to_string());
             let start = Instant::now();
             let plan = contender
@@ -149,7 +156,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
 
     let mut results = Vec::new();
     for contender in &mut contenders {
-        let technique = contender.bencher.technique().clone();
+        let technique = contender.technique;
         let plan = contender
             .planner
             .plan(&camera, &[lamp.light], &bounds, &technique.options)
@@ -177,8 +184,8 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
         }
         results.push(ResultJson {
             shadows: technique.spec.to_string(),
-            backend: contender.bencher.name(),
-            device: execution.device().filter(|_| contender.bencher.is_gpu()),
+            backend: contender.bencher.executor().name(),
+            device: execution.device().filter(|_| contender.bencher.executor().is_gpu()),
             gpu_timestamps: contender.bencher.has_timestamps(),
             maps: plan.maps.len(),
             texels: plan.texels(),

@@ -4,9 +4,10 @@ use crate::args::{Backend, ExecutionArgs};
 use crate::output::note;
 use crate::pixels::{Rows, Strip, milliseconds};
 use crate::spec::Technique;
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail};
 use rayon::prelude::*;
 use std::time::Instant;
+use umbrage::visibility::Filter;
 use umbrage::{Plan, ShadowMap, Warp};
 use umbrage_render::{Drawn, FrameTarget, Gpu, Look, Renderer, SceneBuffers, Timer};
 use umbrage_scene::Scene;
@@ -112,55 +113,48 @@ impl<'a> Sets<'a> {
             Some((gpu, buffers)) if runs_on_gpu(technique) => {
                 let options = ShadowOptions { filter, ..ShadowOptions::default() };
                 let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
-                Ok(Executor::Gpu { renderer: Box::new(renderer), gpu, plan: None })
+                Ok(Executor::Gpu(Box::new(OnGpu { renderer, gpu, plan: None })))
             }
-            _ => Ok(Executor::Reference {
-                tracer: &self.tracer,
-                technique: technique.clone(),
-                maps: None,
-            }),
+            _ => Ok(Executor::Reference { tracer: &self.tracer, filter, maps: None }),
         }
     }
 }
 
 /// Renders a technique's maps and looks them up.
 pub(crate) enum Executor<'a> {
-    Gpu {
-        renderer: Box<Renderer<'a, 'a>>,
-        gpu: &'a Gpu,
-        plan: Option<&'a Plan>,
-    },
-    Reference {
-        tracer: &'a Tracer<'a>,
-        technique: Technique,
-        maps: Option<(&'a Plan, Reference<'a>)>,
-    },
+    Gpu(Box<OnGpu<'a>>),
+    Reference { tracer: &'a Tracer<'a>, filter: Filter, maps: Option<(&'a Plan, Reference<'a>)> },
+}
+
+/// A GPU at work.
+pub(crate) struct OnGpu<'a> {
+    renderer: Renderer<'a, 'a>,
+    gpu: &'a Gpu,
+    /// Whose maps are drawn.
+    plan: Option<&'a Plan>,
 }
 
 impl<'a> Executor<'a> {
     /// `gpu` or `reference`.
     pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Gpu { .. } => GPU,
-            Self::Reference { .. } => REFERENCE,
-        }
+        if self.is_gpu() { GPU } else { REFERENCE }
     }
 
     /// Whether it is a GPU.
     pub(crate) fn is_gpu(&self) -> bool {
-        matches!(self, Self::Gpu { .. })
+        matches!(self, Self::Gpu(_))
     }
 
     /// Renders the maps of a plan, in place of those of the one before.
     pub(crate) fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<()> {
         match self {
-            Self::Gpu { renderer, gpu, plan } => {
-                renderer.draw_maps(new, Casters::Still, None).context("--backend gpu")?;
-                gpu.wait()?;
-                *plan = Some(new);
+            Self::Gpu(on) => {
+                on.renderer.draw_maps(new, Casters::Still, None).context("--backend gpu")?;
+                on.gpu.wait()?;
+                on.plan = Some(new);
             }
-            Self::Reference { tracer, technique, maps } => {
-                *maps = Some((new, Reference::render(tracer, new, technique.filter, progress)?));
+            Self::Reference { tracer, filter, maps } => {
+                *maps = Some((new, Reference::render(tracer, new, *filter, progress)?));
             }
         }
         Ok(())
@@ -169,10 +163,10 @@ impl<'a> Executor<'a> {
     /// What rows of a picture look like. The maps must be rendered.
     pub(crate) fn strip(&mut self, rows: &Rows<'_>) -> Result<Strip> {
         match self {
-            Self::Gpu { renderer, .. } => {
+            Self::Gpu(on) => {
                 let (camera, grid) = (rows.view.camera(), rows.view.grid());
                 let look = Look { camera, light: rows.view.light(), light_index: 0 };
-                let samples = renderer.samples(&look, rows.range.clone(), grid, true)?;
+                let samples = on.renderer.samples(&look, rows.range.clone(), grid, true)?;
                 Ok(Strip::of_gpu(&samples, grid, camera))
             }
             Self::Reference { maps, .. } => {
@@ -186,7 +180,7 @@ impl<'a> Executor<'a> {
     pub(crate) fn shape(&mut self, rows: &Rows<'_>) -> Result<Strip> {
         match self {
             // Maps that there are not let all light through.
-            Self::Gpu { .. } => self.strip(rows),
+            Self::Gpu(_) => self.strip(rows),
             Self::Reference { .. } => Ok(rows.in_full_light()),
         }
     }
@@ -194,15 +188,13 @@ impl<'a> Executor<'a> {
     /// How much light the maps let through to points of surfaces that face it.
     pub(crate) fn visibility(&mut self, samples: &[&Sample]) -> Result<Vec<f32>> {
         match self {
-            Self::Gpu { renderer, plan, .. } => {
-                let plan = plan.context("maps are rendered first")?;
+            Self::Gpu(on) => {
+                let plan = on.plan.context("maps are rendered first")?;
                 let points: Vec<_> = samples
                     .iter()
                     .map(|s| [s.surface.position, s.surface.geometric_normal])
                     .collect();
-                let visibility = renderer.visibility(plan, 0, &points)?;
-                ensure!(visibility.len() == samples.len(), "one value a sample");
-                Ok(visibility)
+                Ok(on.renderer.visibility(plan, 0, &points)?)
             }
             Self::Reference { maps, .. } => {
                 let (_, reference) = maps.as_ref().context("maps are rendered first")?;
@@ -222,54 +214,42 @@ pub(crate) struct Costs {
 
 /// Draws frame after frame for a stop-watch.
 pub(crate) struct Bencher<'a> {
-    technique: Technique,
-    kind: BencherKind<'a>,
-}
-
-enum BencherKind<'a> {
-    Gpu { renderer: Box<Renderer<'a, 'a>>, gpu: &'a Gpu, target: FrameTarget, timer: Option<Timer> },
-    Reference { tracer: &'a Tracer<'a> },
+    executor: Executor<'a>,
+    /// What a GPU draws into, and its watch if it has one.
+    target: Option<(FrameTarget, Option<Timer>)>,
 }
 
 impl Sets<'_> {
     /// Who draws frames of so many pixels.
     pub(crate) fn bencher(&self, technique: &Technique, size: [u32; 2]) -> Result<Bencher<'_>> {
-        let kind = match self.executor(technique)? {
-            Executor::Gpu { renderer, gpu, .. } => {
-                let target = FrameTarget::new(gpu, size).context("--size")?;
-                BencherKind::Gpu { renderer, gpu, target, timer: Timer::new(gpu) }
+        let executor = self.executor(technique)?;
+        let target = match &executor {
+            Executor::Gpu(on) => {
+                Some((FrameTarget::new(on.gpu, size).context("--size")?, Timer::new(on.gpu)))
             }
-            Executor::Reference { tracer, .. } => BencherKind::Reference { tracer },
+            Executor::Reference { .. } => None,
         };
-        Ok(Bencher { technique: technique.clone(), kind })
+        Ok(Bencher { executor, target })
     }
 }
 
 impl Bencher<'_> {
-    pub(crate) fn technique(&self) -> &Technique {
-        &self.technique
-    }
-
-    /// `gpu` or `reference`.
-    pub(crate) fn name(&self) -> &'static str {
-        if self.is_gpu() { GPU } else { REFERENCE }
-    }
-
-    pub(crate) fn is_gpu(&self) -> bool {
-        matches!(self.kind, BencherKind::Gpu { .. })
+    /// Who draws.
+    pub(crate) fn executor(&self) -> &Executor<'_> {
+        &self.executor
     }
 
     /// Whether the GPU tells how long its passes take.
     pub(crate) fn has_timestamps(&self) -> bool {
-        matches!(self.kind, BencherKind::Gpu { timer: Some(_), .. })
+        matches!(self.target, Some((_, Some(_))))
     }
 
     /// Memory of a plan's maps, once they are drawn.
     pub(crate) fn bytes(&self, plan: &Plan) -> u64 {
-        match &self.kind {
-            BencherKind::Gpu { renderer, .. } => renderer.shadows().texture_bytes(),
-            BencherKind::Reference { .. } => {
-                let side = |n: u32| u64::from(n + 2 * self.technique.filter.reach_texels());
+        match &self.executor {
+            Executor::Gpu(on) => on.renderer.shadows().texture_bytes(),
+            Executor::Reference { filter, .. } => {
+                let side = |n: u32| u64::from(n + 2 * filter.reach_texels());
                 let texels = |m: &ShadowMap| side(m.resolution[0]) * side(m.resolution[1]);
                 4 * plan.maps.iter().filter(|m| !m.is_empty()).map(texels).sum::<u64>()
             }
@@ -278,33 +258,32 @@ impl Bencher<'_> {
 
     /// Draws a frame, and waits until it is done. `still`: maps that are as they were are not drawn again.
     pub(crate) fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs> {
-        match &mut self.kind {
-            BencherKind::Gpu { renderer, gpu, target, timer } => {
+        let start = Instant::now();
+        match (&mut self.executor, &self.target) {
+            (Executor::Gpu(on), Some((target, timer))) => {
+                let OnGpu { renderer, gpu, .. } = &mut **on;
                 let casters = if still { Casters::Still } else { Casters::Moved };
                 let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
-                let start = Instant::now();
                 let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
-                let mut walls = [0.0; 2];
-                if timer.is_none() {
-                    gpu.wait()?;
-                    walls[0] = milliseconds(start);
-                }
-                let shading = Instant::now();
-                renderer.frame(&look, target, timer.as_ref())?;
                 let [depth, shade] = match timer {
-                    Some(timer) => timer.read(gpu)?,
+                    Some(timer) => {
+                        renderer.frame(&look, target, Some(timer))?;
+                        timer.read(gpu)?
+                    }
                     None => {
                         gpu.wait()?;
-                        walls[1] = milliseconds(shading);
-                        walls
+                        let depth = milliseconds(start);
+                        let shading = Instant::now();
+                        renderer.frame(&look, target, None)?;
+                        gpu.wait()?;
+                        [depth, milliseconds(shading)]
                     }
                 };
                 let depth = if drawn.is_empty() { 0.0 } else { depth };
                 Ok(Costs { depth, shade, drawn: Some(drawn) })
             }
-            BencherKind::Reference { tracer } => {
-                let start = Instant::now();
-                let reference = Reference::render(tracer, plan, self.technique.filter, &|_| {})?;
+            (Executor::Reference { tracer, filter, .. }, _) => {
+                let reference = Reference::render(tracer, plan, *filter, &|_| {})?;
                 let depth = milliseconds(start);
                 let shading = Instant::now();
                 for range in view.bands() {
@@ -312,6 +291,7 @@ impl Bencher<'_> {
                 }
                 Ok(Costs { depth, shade: milliseconds(shading), drawn: None })
             }
+            (Executor::Gpu(_), None) => bail!("a GPU draws into a target"),
         }
     }
 }

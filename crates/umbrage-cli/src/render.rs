@@ -135,7 +135,7 @@ impl Layers {
         let color = |values: Vec<[f32; 3]>| Ok(write_exr(path, &Image::new(size, values)?)?);
         match args.aov {
             Aov::Color => color(self.shape.radiance),
-            Aov::Normal => color(self.shape.normal.iter().map(|n| n.to_array()).collect()),
+            Aov::Normal => color(self.shape.normal.iter().map(glam::Vec3::to_array).collect()),
             Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
             Aov::Visibility => plane(self.technique.visibility),
             Aov::Truth => plane(self.truth.visibility),

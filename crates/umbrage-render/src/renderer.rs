@@ -314,7 +314,8 @@ impl<'g, 's> Renderer<'g, 's> {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let pipelines = CasterPipelines { opaque: &self.opaque, masked: &self.masked };
         let masks = &self.masks;
-        prepared.encode(&mut encoder, timer.map(Timer::depth_pass), |map| {
+        let timestamps = timer.map(Timer::depth_pass);
+        prepared.encode(&mut encoder, timestamps.as_ref(), |map| {
             let list = lists.iter().find(|(index, _)| *index == map.index);
             let draws = list.map_or(&[][..], |(_, list)| &instances.draws[list.clone()]);
             let mut into_map = Drawn::default();
@@ -323,7 +324,7 @@ impl<'g, 's> Renderer<'g, 's> {
                 let material = scene.meshes[draw.mesh].material;
                 let mask = masks[material].as_ref();
                 drawer.choose(usize::from(mask.is_some()), |pass| {
-                    pipelines.set(pass, mask.is_some())
+                    pipelines.set(pass, mask.is_some());
                 });
                 if let Some(mask) = mask {
                     drawer.pass.set_bind_group(1, mask, &[]);

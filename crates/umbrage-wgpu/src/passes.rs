@@ -50,7 +50,7 @@ impl Prepared<'_> {
     pub fn encode(
         self,
         encoder: &mut CommandEncoder,
-        timestamps: Option<RenderPassTimestampWrites<'_>>,
+        timestamps: Option<&RenderPassTimestampWrites<'_>>,
         mut draw: impl FnMut(&mut MapPass<'_, '_>),
     ) -> usize {
         let Self { shadows, plan, render_origin } = self;
@@ -71,7 +71,7 @@ impl Prepared<'_> {
             let in_layer = |r: &&Record| r.place.is_some_and(|p| p.layer as usize == layer);
             let is_whole = records.iter().filter(in_layer).all(|r| r.stale_place().is_some());
             let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
-            let timestamps = timestamps.as_ref().and_then(|t| {
+            let timestamps = timestamps.and_then(|t| {
                 let begin = t.beginning_of_pass_write_index.filter(|_| Some(layer) == first);
                 let end = t.end_of_pass_write_index.filter(|_| Some(layer) == last);
                 (begin.is_some() || end.is_some()).then_some(RenderPassTimestampWrites {

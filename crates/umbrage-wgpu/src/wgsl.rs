@@ -73,7 +73,7 @@ fn choose(text: &str, flags: &[(&str, bool)]) -> String {
     for line in text.lines() {
         match line.trim().split_once(' ').unwrap_or((line.trim(), "")) {
             ("//IF", name) => {
-                stack.push(flags.iter().any(|&(flag, is_set)| flag == name && is_set))
+                stack.push(flags.iter().any(|&(flag, is_set)| flag == name && is_set));
             }
             ("//ELSE", _) => {
                 if let Some(is_kept) = stack.last_mut() {

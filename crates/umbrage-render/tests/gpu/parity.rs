@@ -87,7 +87,8 @@ fn compare(
         let map = place.map(|p| p.map as u32);
         let texel = place.map_or(0.0, |p| (p.texel - gpu.texel.as_dvec2()).length());
         // A texel is as wide as several pixels, or a pixel as several texels.
-        d.place += usize::from(map != gpu.map || (map.is_some() && !(texel < 0.1)));
+        d.place +=
+            usize::from(map != gpu.map || (map.is_some() && (texel.is_nan() || texel >= 0.1)));
         let error = place.and_then(|p| {
             let surface = &sample.surface;
             plan.maps[p.map].surface_error(&set.camera, surface.position, surface.geometric_normal)
