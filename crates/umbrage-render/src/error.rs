@@ -3,10 +3,10 @@
 #[non_exhaustive]
 pub enum Error {
     /// No adapter answers, or none of that name.
-    #[error("no GPU answers ({0})")]
+    #[error("no GPU answers: {0}")]
     NoAdapter(String),
     /// The adapter gives no device.
-    #[error("{adapter} gives no device: {problem}")]
+    #[error("{adapter}: {problem}")]
     NoDevice {
         /// Its name.
         adapter: String,

@@ -1,10 +1,11 @@
 use crate::Error;
+use crate::samples::SAMPLE_FORMAT;
 use std::sync::{Arc, Mutex, PoisonError};
 use umbrage_wgpu::Support;
 use wgpu::{
     Adapter, AdapterInfo, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
     DeviceDescriptor, DeviceType, ExperimentalFeatures, Features, Instance, InstanceDescriptor,
-    MemoryHints, PollType, Queue, Trace,
+    MemoryHints, PollType, Queue, TextureUsages, Trace,
 };
 
 /// A device without a window.
@@ -81,7 +82,10 @@ pub fn devices() -> Vec<AdapterReport> {
         let opened = open(&adapter);
         AdapterReport {
             info: adapter.get_info(),
-            support: opened.and_then(|(device, _)| Ok(Support::new(&adapter, &device)?)),
+            support: opened.and_then(|(device, _)| {
+                let support = Support::new(&adapter, &device)?;
+                check_renderer(&adapter).map(|()| support)
+            }),
             has_timestamps: adapter.features().contains(Features::TIMESTAMP_QUERY),
         }
     };
@@ -101,6 +105,18 @@ fn open(adapter: &Adapter) -> Result<(Device, Queue), Error> {
         .map_err(|e| Error::NoDevice { adapter: adapter.get_info().name, problem: e.to_string() })
 }
 
+/// That it can draw what samples are read back from, which WebGPU guarantees but OpenGL does not have.
+fn check_renderer(adapter: &Adapter) -> Result<(), Error> {
+    let features = adapter.get_texture_format_features(SAMPLE_FORMAT);
+    if features.allowed_usages.contains(TextureUsages::RENDER_ATTACHMENT) {
+        return Ok(());
+    }
+    Err(Error::NoDevice {
+        adapter: adapter.get_info().name,
+        problem: "it cannot draw floats of 32 bits, which pictures are measured by".into(),
+    })
+}
+
 impl Gpu {
     /// The best adapter that can do what is needed. The environment's `WGPU_ADAPTER_NAME` picks one by a part of its name,
     /// `WGPU_BACKEND` by its kind (`vulkan`, `metal`, `dx12`, `gl`).
@@ -113,7 +129,7 @@ impl Gpu {
             wanted.as_ref().is_none_or(|w| a.get_info().name.to_lowercase().contains(w))
         };
         let mut problem = match &wanted {
-            Some(name) => format!("none of which is called `{name}`"),
+            Some(name) => format!("none is called `{name}`"),
             None => "install a driver for Vulkan, Metal or Direct3D 12".to_owned(),
         };
         for adapter in adapters().iter().filter(|a| is_wanted(a)) {
@@ -128,6 +144,7 @@ impl Gpu {
     fn of(adapter: &Adapter) -> Result<Self, Error> {
         let (device, queue) = open(adapter)?;
         let support = Support::new(adapter, &device)?;
+        check_renderer(adapter)?;
         let trouble = Arc::new(Mutex::new(Trouble::default()));
         let told = Arc::clone(&trouble);
         device.set_device_lost_callback(move |_, message| {

@@ -33,7 +33,8 @@ pub struct Sample {
     pub error: f32,
 }
 
-const DATA: TextureFormat = TextureFormat::Rgba32Float;
+/// Format of what is read back.
+pub(crate) const SAMPLE_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
 /// The longest side of a tile, samples: 32 MB each of three layers.
 const TILE: u32 = 1024;
@@ -56,8 +57,8 @@ impl Renderer<'_, '_> {
         let nothing = Sample::new(Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, 0.0, -1.0, 0.0));
         let mut samples = vec![nothing; (width as usize) * (end - first) as usize];
         let side = TILE.min(self.gpu.device().limits().max_texture_dimension_2d);
-        let picture = self.pipelines("picture", &[DATA, DATA]);
-        let texels = wants_texels.then(|| self.pipelines("texels", &[DATA]));
+        let picture = self.pipelines("picture", &[SAMPLE_FORMAT, SAMPLE_FORMAT]);
+        let texels = wants_texels.then(|| self.pipelines("texels", &[SAMPLE_FORMAT]));
         let size = [side.min(width), side.min(end - first)];
         let layers = Layers::new(self.gpu, size);
         for top in (first..end).step_by(side as usize) {
@@ -127,7 +128,7 @@ impl Layers {
             mapped_at_creation: false,
         });
         Self {
-            color: [texture(DATA), texture(DATA)],
+            color: [texture(SAMPLE_FORMAT), texture(SAMPLE_FORMAT)],
             depth: texture(DEPTH_FORMAT),
             readback,
             bytes_per_row,

@@ -41,7 +41,8 @@ fn models() -> impl Iterator<Item = DAffine3> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     // 1. Ask for the features that make shadows faster, as far as the adapter has them.
-    let instance = wgpu::Instance::default();
+    let instance =
+        wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         required_features: adapter.features() & Support::WANTED_FEATURES,

@@ -198,9 +198,9 @@ impl Shadows {
             compare: (comparison == Comparison::Hardware).then_some(CompareFunction::LessEqual),
             ..SamplerDescriptor::default()
         });
-        let lookup_layout = lookup_layout(device, &support, comparison);
+        let lookup_layout = lookup_layout(device, &support, &options);
         let buffers = Buffers::new(device, &support);
-        let texture = DepthTexture::new(device, [1, 1], 1);
+        let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
         let lookup_bind_group = buffers.bind(device, &lookup_layout, &texture, &sampler);
         Ok(Self {
             options,
@@ -262,8 +262,7 @@ impl Shadows {
     /// that reaches the point by the maps alone; 1 where no map serves it. That a surface facing away from the light is
     /// dark is for your shading to say. Textures of other filters may take more bindings in the same group.
     pub fn lookup_wgsl(&self, group: u32) -> String {
-        let ShadowOptions { filter, comparison, .. } = self.options;
-        wgsl::lookup(group, filter, comparison, self.support.storage_buffers)
+        wgsl::lookup(group, &self.options, self.support.storage_buffers)
     }
 
     /// Layout of the bind group that [`lookup_wgsl`](Self::lookup_wgsl) takes, for fragment shaders and, on devices with
@@ -306,7 +305,7 @@ impl Shadows {
         }
     }
 
-    /// The depths of all maps: an array texture of [`DEPTH_FORMAT`], in which [`place`](Self::place) says where they lie.
+    /// The depths of all maps: a texture of [`DEPTH_FORMAT`], with layers where the layout says so, in which [`place`](Self::place) says where they lie.
     pub fn depth_texture(&self) -> &Texture {
         &self.texture.texture
     }
@@ -358,7 +357,8 @@ impl Shadows {
         self.lookup.check(&self.support)?;
         let mut rebind = false;
         if !self.texture.holds(size, layers) {
-            self.texture = DepthTexture::new(device, size, layers);
+            self.texture =
+                DepthTexture::new(device, &self.support, self.options.layout, size, layers);
             rebind = true;
         }
         rebind |= self.buffers.hold(device, &self.support, &self.lookup);
@@ -397,13 +397,20 @@ impl Shadows {
 }
 
 impl DepthTexture {
-    fn new(device: &Device, size: [u32; 2], layers: u32) -> Self {
+    fn new(
+        device: &Device,
+        support: &Support,
+        layout: Layout,
+        size: [u32; 2],
+        layers: u32,
+    ) -> Self {
+        let layers = if layout == Layout::Layers { support.array_layers(layers) } else { 1 };
         let texture = device.create_texture(&TextureDescriptor {
             label: Some("shadow depths"),
             size: Extent3d {
                 width: size[0].max(1),
                 height: size[1].max(1),
-                depth_or_array_layers: layers.max(1),
+                depth_or_array_layers: layers,
             },
             mip_level_count: 1,
             sample_count: 1,
@@ -422,8 +429,8 @@ impl DepthTexture {
                 ..TextureViewDescriptor::default()
             })
         };
-        let all = view(TextureViewDimension::D2Array, 0, None);
-        let layers = (0..layers.max(1)).map(|i| view(TextureViewDimension::D2, i, Some(1)));
+        let all = view(view_dimension(layout), 0, None);
+        let layers = (0..layers).map(|i| view(TextureViewDimension::D2, i, Some(1)));
         Self { all, layers: layers.collect(), texture, is_fresh: true }
     }
 
@@ -560,6 +567,13 @@ impl CasterBuffer {
     }
 }
 
+fn view_dimension(layout: Layout) -> TextureViewDimension {
+    match layout {
+        Layout::Atlas => TextureViewDimension::D2,
+        Layout::Layers => TextureViewDimension::D2Array,
+    }
+}
+
 /// Depth state with this comparison.
 pub(crate) fn depth_state(compare: CompareFunction) -> DepthStencilState {
     DepthStencilState {
@@ -571,7 +585,7 @@ pub(crate) fn depth_state(compare: CompareFunction) -> DepthStencilState {
     }
 }
 
-fn lookup_layout(device: &Device, support: &Support, comparison: Comparison) -> BindGroupLayout {
+fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) -> BindGroupLayout {
     let visibility = if support.storage_buffers {
         ShaderStages::FRAGMENT | ShaderStages::COMPUTE
     } else {
@@ -590,10 +604,10 @@ fn lookup_layout(device: &Device, support: &Support, comparison: Comparison) -> 
         buffer(array),
         BindingType::Texture {
             sample_type: TextureSampleType::Depth,
-            view_dimension: TextureViewDimension::D2Array,
+            view_dimension: view_dimension(options.layout),
             multisampled: false,
         },
-        BindingType::Sampler(match comparison {
+        BindingType::Sampler(match options.comparison {
             Comparison::PerTexel => SamplerBindingType::NonFiltering,
             Comparison::Hardware => SamplerBindingType::Comparison,
         }),

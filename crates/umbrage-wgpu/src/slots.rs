@@ -129,6 +129,7 @@ mod tests {
         depth_fetch: true,
         max_side: 1024,
         max_layers: 4,
+        any_layers: true,
         uniform_alignment: 256,
     };
 

@@ -8,6 +8,7 @@ use wgpu::{Adapter, Backend, Device, DownlevelFlags, Features, Limits};
 /// | [`Features::DEPTH_CLIP_CONTROL`] | casters before a map's depths are clamped in the fragment shader, which writes depth: slower, the same picture |
 /// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold 16 lights, 64 maps and 512 planes |
 /// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` |
+/// | arrays of any number of layers (OpenGL) | a layer more for 1, 6, 12 … |
 /// | comparison samplers, where depths cannot be fetched | [`Error::Unsupported`] |
 ///
 /// Fields are public so that a fallback can be forced: set one to `false`.
@@ -23,6 +24,9 @@ pub struct Support {
     pub max_side: u32,
     /// Layers of a texture.
     pub max_layers: u32,
+    /// Whether an array texture can have any number of layers. (OpenGL under wgpu takes textures of one layer for plain
+    /// ones, and of six for cubes; such arrays get a layer more.)
+    pub any_layers: bool,
     /// What offsets into uniform buffers must be multiples of, bytes.
     pub uniform_alignment: u32,
 }
@@ -77,8 +81,16 @@ impl Support {
             depth_fetch,
             max_side: limits.max_texture_dimension_2d,
             max_layers: limits.max_texture_array_layers,
+            any_layers: backend != Backend::Gl,
             uniform_alignment: limits.min_uniform_buffer_offset_alignment.max(1),
         })
+    }
+
+    /// How many layers an array texture gets that needs so many.
+    pub(crate) fn array_layers(&self, needed: u32) -> u32 {
+        let needed = needed.max(1);
+        let is_odd = needed == 1 || needed.is_multiple_of(6);
+        needed + u32::from(is_odd && !self.any_layers)
     }
 }
 
@@ -106,6 +118,7 @@ mod tests {
         let support = Support::of(Features::empty(), &limits, webgl2(), Backend::Gl).unwrap();
         assert!(!support.storage_buffers && !support.depth_fetch);
         assert_eq!(support.max_side, 2048);
+        assert_eq!([0, 1, 2, 5, 6, 12].map(|n| support.array_layers(n)), [2, 2, 2, 5, 7, 13]);
     }
 
     #[test]

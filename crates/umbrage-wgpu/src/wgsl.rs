@@ -1,6 +1,6 @@
 //! Shader text, put together for a device, a filter and a bind group.
 
-use crate::{Comparison, Support};
+use crate::{Comparison, Layout, ShadowOptions, Support};
 use umbrage::visibility::Filter;
 
 /// What a device without storage buffers can be told of: sizes of the uniform arrays.
@@ -9,12 +9,13 @@ pub(crate) const MAX_MAPS: usize = 64;
 pub(crate) const MAX_PLANES: usize = 512;
 
 /// The lookup module, its bindings in bind group `group`.
-pub(crate) fn lookup(
-    group: u32,
-    filter: Filter,
-    comparison: Comparison,
-    storage_buffers: bool,
-) -> String {
+pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool) -> String {
+    let ShadowOptions { filter, comparison, layout } = *options;
+    // Only in layers do shaders need to be told which.
+    let (texture, layer) = match layout {
+        Layout::Atlas => ("", ""),
+        Layout::Layers => ("_array", ", shadow_maps[map].layer"),
+    };
     let array = |n: usize| if storage_buffers { String::new() } else { format!(", {n}") };
     let sampler = match comparison {
         Comparison::PerTexel => "sampler",
@@ -26,14 +27,14 @@ pub(crate) fn lookup(
         .replace("{LIGHTS}", &array(MAX_LIGHTS))
         .replace("{MAPS}", &array(MAX_MAPS))
         .replace("{PLANES}", &array(MAX_PLANES))
-        .replace("{SAMPLER}", sampler);
+        .replace("{SAMPLER}", sampler)
+        .replace("{ARRAY}", texture);
     let mut text = format!("{}\n{bindings}\n", include_str!("wgsl/lookup.wgsl"));
     if comparison == Comparison::Hardware {
         text += include_str!("wgsl/hardware.wgsl");
         text += "\n";
     }
-    text += &filtered(filter, comparison);
-    text
+    text + &filtered(filter, comparison).replace("{LAYER}", layer)
 }
 
 /// The function that tells how much of a map's texels around a receiver let light through.
@@ -106,6 +107,7 @@ mod tests {
         depth_fetch: true,
         max_side: 8192,
         max_layers: 256,
+        any_layers: true,
         uniform_alignment: 256,
     };
 
@@ -127,19 +129,26 @@ mod tests {
             return vec4f(given, shadow_visibility(1u, position, shadow_normal(position)), place.texel);
         }";
 
-    fn variants() -> impl Iterator<Item = (Filter, Comparison, bool)> {
+    fn variants() -> impl Iterator<Item = (ShadowOptions, bool)> {
         let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
-        filters.flat_map(|filter| {
+        let with = |filter| {
             let comparisons = [Comparison::PerTexel, Comparison::Hardware];
-            comparisons.into_iter().flat_map(move |c| [true, false].map(|s| (filter, c, s)))
-        })
+            comparisons.into_iter().flat_map(move |comparison| {
+                [Layout::Atlas, Layout::Layers].map(|layout| ShadowOptions {
+                    filter,
+                    comparison,
+                    layout,
+                })
+            })
+        };
+        filters.flat_map(with).flat_map(|options| [true, false].map(|storage| (options, storage)))
     }
 
     #[test]
     fn every_lookup_module_is_valid_in_front_of_a_users_shader() {
-        for (filter, comparison, storage) in variants() {
+        for (options, storage) in variants() {
             for group in [0, 3] {
-                validated(&(lookup(group, filter, comparison, storage) + USER));
+                validated(&(lookup(group, &options, storage) + USER));
             }
         }
     }
@@ -159,8 +168,8 @@ mod tests {
 
     #[test]
     fn nothing_pollutes_a_users_names() {
-        for (filter, comparison, storage) in variants() {
-            let (module, _) = validated(&lookup(1, filter, comparison, storage));
+        for (options, storage) in variants() {
+            let (module, _) = validated(&lookup(1, &options, storage));
             let functions = module.functions.iter().filter_map(|(_, f)| f.name.as_deref());
             let globals = module.global_variables.iter().filter_map(|(_, g)| g.name.as_deref());
             let constants = module.constants.iter().filter_map(|(_, c)| c.name.as_deref());
@@ -191,7 +200,7 @@ mod tests {
 
     #[test]
     fn structs_are_laid_out_alike() {
-        let (module, _) = validated(&(lookup(0, Filter::Hard, Comparison::PerTexel, true) + USER));
+        let (module, _) = validated(&(lookup(0, &ShadowOptions::default(), true) + USER));
         let m = &module;
         check_layout!(
             m,

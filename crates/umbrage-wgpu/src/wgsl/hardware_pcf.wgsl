@@ -14,7 +14,6 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let first = floor(start);
     let fraction = start - first;
     let origin = shadow_maps[map].origin;
-    let layer = shadow_maps[map].layer;
     var sum = 0.0;
     for (var y = 0; y <= SHADOW_PCF; y += 2) {
         let row = shadow_pcf_weight(y + 1, fraction.y);
@@ -28,7 +27,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
                 let center = low + 0.5 + vec2f(column / columns, row / rows);
                 let at = (center + origin) * shadow_settings.texture_scale;
                 let limit = shadow_hardware_limit(receiver, low + 1.0, 0.5);
-                sum += weight * textureSampleCompareLevel(shadow_depths, shadow_sampler, at, layer, limit);
+                sum += weight * textureSampleCompareLevel(shadow_depths, shadow_sampler, at{LAYER}, limit);
             }
         }
     }

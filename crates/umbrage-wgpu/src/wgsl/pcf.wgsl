@@ -15,7 +15,6 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let first = floor(start);
     let fraction = start - first;
     let origin = shadow_maps[map].origin;
-    let layer = shadow_maps[map].layer;
     var sum = 0.0;
     for (var y = 0; y <= SHADOW_PCF; y += 2) {
         let rows = vec2f(shadow_pcf_weight(y, fraction.y), shadow_pcf_weight(y + 1, fraction.y));
@@ -24,7 +23,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
             // The corner where four texels meet.
             let corner = first + vec2f(vec2i(x, y)) + 1.0;
             let at = (corner + origin) * shadow_settings.texture_scale;
-            let depths = textureGather(shadow_depths, shadow_sampler, at, layer);
+            let depths = textureGather(shadow_depths, shadow_sampler, at{LAYER});
             // Lower left, lower right, upper right, upper left, where up is towards smaller t.
             let limits = vec4f(
                 shadow_nearest_lit(receiver, corner + vec2f(-0.5, 0.5)),
