@@ -195,7 +195,11 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             ms: TimesJson {
                 plan: spread(|f| f.plan),
                 depth: spread(|f| f.costs.depth),
-                filter: None,
+                filter: counted
+                    .iter()
+                    .map(|f| f.costs.filter)
+                    .collect::<Option<Vec<_>>>()
+                    .and_then(|values| Spread::of(values.into_iter())),
                 shade: spread(|f| f.costs.shade),
                 frame: spread(|f| f.frame),
             },
@@ -223,6 +227,7 @@ fn table(bench: &BenchJson) -> String {
         "median ms of",
         "plan",
         "depth",
+        "filter",
         "shade",
         "frame",
         "first frame",
@@ -243,6 +248,7 @@ fn table(bench: &BenchJson) -> String {
             r.shadows.clone(),
             ms(r.ms.plan, 3),
             ms(r.ms.depth, 2),
+            ms(r.ms.filter, 2),
             ms(r.ms.shade, 2),
             ms(r.ms.frame, 2),
             format!("{:.2}", r.first_ms.frame),

@@ -207,6 +207,8 @@ impl<'a> Executor<'a> {
 /// What a frame cost, milliseconds.
 pub(crate) struct Costs {
     pub(crate) depth: f64,
+    /// Where it is told apart from `depth`, and there is any.
+    pub(crate) filter: Option<f64>,
     pub(crate) shade: f64,
     /// Into which map what was drawn, where that is told.
     pub(crate) drawn: Option<Vec<(usize, Drawn)>>,
@@ -247,7 +249,7 @@ impl Bencher<'_> {
     /// Memory of a plan's maps, once they are drawn.
     pub(crate) fn bytes(&self, plan: &Plan) -> u64 {
         match &self.executor {
-            Executor::Gpu(on) => on.renderer.shadows().texture_bytes(),
+            Executor::Gpu(on) => on.renderer.shadows().lookup_bytes(),
             Executor::Reference { filter, .. } => {
                 let side = |n: u32| u64::from(n + 2 * filter.reach_texels());
                 let texels = |m: &ShadowMap| side(m.resolution[0]) * side(m.resolution[1]);
@@ -265,7 +267,7 @@ impl Bencher<'_> {
                 let casters = if still { Casters::Still } else { Casters::Moved };
                 let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
                 let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
-                let [depth, shade] = match timer {
+                let [depth, filter, shade] = match timer {
                     Some(timer) => {
                         renderer.frame(&look, target, Some(timer))?;
                         timer.read(gpu)?
@@ -276,11 +278,15 @@ impl Bencher<'_> {
                         let shading = Instant::now();
                         renderer.frame(&look, target, None)?;
                         gpu.wait()?;
-                        [depth, milliseconds(shading)]
+                        [depth, 0.0, milliseconds(shading)]
                     }
                 };
-                let depth = if drawn.is_empty() { 0.0 } else { depth };
-                Ok(Costs { depth, shade, drawn: Some(drawn) })
+                let is_still = drawn.is_empty();
+                let [depth, filter] = if is_still { [0.0; 2] } else { [depth, filter] };
+                let is_prefiltered =
+                    matches!(renderer.shadows().options().filter, Filter::Prefiltered(_));
+                let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
+                Ok(Costs { depth, filter, shade, drawn: Some(drawn) })
             }
             (Executor::Reference { tracer, filter, .. }, _) => {
                 let reference = Reference::render(tracer, plan, *filter, &|_| {})?;
@@ -289,7 +295,7 @@ impl Bencher<'_> {
                 for range in view.bands() {
                     Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
                 }
-                Ok(Costs { depth, shade: milliseconds(shading), drawn: None })
+                Ok(Costs { depth, filter: None, shade: milliseconds(shading), drawn: None })
             }
             (Executor::Gpu(_), None) => bail!("a GPU draws into a target"),
         }

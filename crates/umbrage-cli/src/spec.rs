@@ -69,13 +69,8 @@ pub(crate) struct Technique {
 impl Technique {
     /// What executes `spec`, or why this version cannot.
     pub(crate) fn new(spec: Spec) -> Result<Self> {
-        let filter = match &spec.filter {
-            None | Some(Filter::Hard) => visibility::Filter::Hard,
-            Some(Filter::Pcf(n)) => visibility::Filter::pcf(*n)?,
-            Some(other) => {
-                bail!("`{other}` filters are not available in this version; `hard` and `pcfN` are")
-            }
-        };
+        let filter =
+            spec.filter.as_ref().map_or(Ok(visibility::Filter::Hard), Filter::executable)?;
         let size = match spec.size.unwrap_or(DEFAULT_SIZE) {
             TexelSize::Side(n) => Size::Budget(u64::from(n).pow(2)),
             TexelSize::Exact(size) => Size::Exact(size),

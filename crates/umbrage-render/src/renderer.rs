@@ -314,8 +314,8 @@ impl<'g, 's> Renderer<'g, 's> {
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let pipelines = CasterPipelines { opaque: &self.opaque, masked: &self.masked };
         let masks = &self.masks;
-        let timestamps = timer.map(Timer::depth_pass);
-        prepared.encode(&mut encoder, timestamps.as_ref(), |map| {
+        let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
+        prepared.encode(&mut encoder, &timestamps, |map| {
             let list = lists.iter().find(|(index, _)| *index == map.index);
             let draws = list.map_or(&[][..], |(_, list)| &instances.draws[list.clone()]);
             let mut into_map = Drawn::default();

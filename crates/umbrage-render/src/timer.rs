@@ -1,6 +1,7 @@
 //! How long stages take on the GPU, by timestamp queries.
 
 use crate::{Error, Gpu};
+use umbrage_wgpu::Timestamps;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, QuerySet, QuerySetDescriptor,
     QueryType, RenderPassTimestampWrites,
@@ -13,7 +14,7 @@ pub struct Timer {
     readback: Buffer,
 }
 
-const COUNT: u32 = 4;
+const COUNT: u32 = 6;
 const BYTES: u64 = 8 * COUNT as u64;
 
 impl Timer {
@@ -49,8 +50,8 @@ impl Timer {
         }
     }
 
-    pub(crate) fn depth_pass(&self) -> RenderPassTimestampWrites<'_> {
-        self.writes(0)
+    pub(crate) fn map_passes(&self) -> Timestamps<'_> {
+        Timestamps { depth: Some(self.writes(0)), filter: Some(self.writes(4)) }
     }
 
     pub(crate) fn shade_pass(&self) -> RenderPassTimestampWrites<'_> {
@@ -62,15 +63,15 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
     }
 
-    /// Milliseconds that the last frame's depth passes and its picture took on the GPU, after waiting for it. Depth
-    /// passes that there were not keep the time of the last frame that had some.
+    /// Milliseconds that the last frame's depth passes, filters and picture took on the GPU, after waiting for it. Passes that
+    /// there were not keep the time of the last frame that had some.
     ///
     /// # Errors
     /// The device's loss.
-    pub fn read(&self, gpu: &Gpu) -> Result<[f64; 2], Error> {
+    pub fn read(&self, gpu: &Gpu) -> Result<[f64; 3], Error> {
         let ticks: Vec<u64> = gpu.read(&self.readback)?;
         let ms = f64::from(gpu.queue().get_timestamp_period()) * 1e-6;
         let span = |i: usize| ticks[i + 1].saturating_sub(ticks[i]) as f64 * ms;
-        Ok([span(0), span(2)])
+        Ok([span(0), span(4), span(2)])
     }
 }

@@ -51,6 +51,7 @@ mod placement;
 mod reference;
 mod samples;
 pub mod shade;
+mod statistics;
 mod tracer;
 mod triangle;
 

@@ -1,7 +1,9 @@
+use crate::statistics::StatisticMap;
 use crate::{Error, Progress, Ray, Sample, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use umbrage::visibility::{Filter, texel_coordinates, visibility};
+use umbrage::visibility::statistic::Channels;
+use umbrage::visibility::{Filter, Prefilter, Texels, texel_coordinates, visibility};
 use umbrage::{Plan, ShadowMap};
 
 /// A shadow map's depths, each found by a ray through its texel's centre.
@@ -57,6 +59,16 @@ impl DepthMap {
         self.resolution
     }
 
+    /// Texels, the gutter's included.
+    fn texels_stored(&self) -> u64 {
+        self.texels.len() as u64
+    }
+
+    /// Width of the gutter, texels.
+    pub(crate) fn gutter(&self) -> u32 {
+        self.gutter
+    }
+
     /// Depth of texel (`i`, `j`); the nearest one that there is for indices beyond the gutter, 1 in a
     /// map without texels.
     pub fn texel(&self, i: i32, j: i32) -> f32 {
@@ -69,6 +81,16 @@ impl DepthMap {
         };
         let width = (self.resolution[0] + 2 * self.gutter) as usize;
         self.texels[clamp(j, self.resolution[1]) * width + clamp(i, self.resolution[0])]
+    }
+}
+
+/// What lookups read of a texel, bytes.
+fn bytes_per_texel(filter: Filter) -> u32 {
+    match filter {
+        Filter::Prefiltered(Prefilter { statistic, .. }) => {
+            statistic.channels() as u32 * statistic.storage().bytes()
+        }
+        _ => 4,
     }
 }
 
@@ -89,6 +111,27 @@ pub struct Reference<'a> {
     plan: &'a Plan,
     filter: Filter,
     maps: Vec<DepthMap>,
+    /// One a map if the filter is applied ahead of lookup, else none.
+    statistics: Vec<StatisticMap>,
+}
+
+/// A map's depths, and what was made of them.
+struct Filtered<'a> {
+    depths: &'a DepthMap,
+    statistics: Option<&'a StatisticMap>,
+}
+
+impl Texels for Filtered<'_> {
+    fn depth(&self, i: i32, j: i32) -> f32 {
+        self.depths.texel(i, j)
+    }
+
+    fn statistics(&self, map: &ShadowMap, prefilter: &Prefilter, texel: DVec2) -> Channels {
+        match self.statistics {
+            Some(statistics) => statistics.sample(texel),
+            None => (|i, j| self.depths.texel(i, j)).statistics(map, prefilter, texel),
+        }
+    }
 }
 
 /// A place in one of a plan's maps.
@@ -113,13 +156,28 @@ impl<'a> Reference<'a> {
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
         let render = |map| DepthMap::render(tracer, map, filter.reach_texels(), progress);
-        let maps = plan.maps.iter().map(render).collect::<Result<_, _>>()?;
-        Ok(Self { plan, filter, maps })
+        let maps = plan.maps.iter().map(render).collect::<Result<Vec<_>, _>>()?;
+        let statistics = match &filter {
+            Filter::Prefiltered(prefilter) => {
+                let filtered = plan.maps.iter().zip(&maps);
+                filtered
+                    .map(|(m, d)| StatisticMap::new(m, d, prefilter))
+                    .collect::<Result<_, _>>()?
+            }
+            _ => Vec::new(),
+        };
+        Ok(Self { plan, filter, maps, statistics })
     }
 
     /// Rows of texels that [`render`](Self::render) will report.
     pub fn rows(plan: &Plan, filter: Filter) -> u64 {
         plan.maps.iter().map(|m| DepthMap::rows(m, filter.reach_texels())).sum()
+    }
+
+    /// Memory of all that is looked up, bytes: what a texel takes on a GPU, gutters included.
+    pub fn bytes(&self) -> u64 {
+        let texels = self.maps.iter().map(DepthMap::texels_stored).sum::<u64>();
+        texels * u64::from(bytes_per_texel(self.filter))
     }
 
     /// The maps' depths, in the plan's order.
@@ -139,7 +197,9 @@ impl<'a> Reference<'a> {
         for (index, share) in self.plan.lookup(light, surface.position) {
             let map = &self.plan.maps[index];
             let value = map.receiver(surface.position, surface.geometric_normal).map_or(1.0, |r| {
-                visibility(map, self.filter, &r, |i, j| self.maps[index].texel(i, j))
+                let depths = &self.maps[index];
+                let statistics = self.statistics.get(index);
+                visibility(map, self.filter, &r, Filtered { depths, statistics })
             });
             sum += share * f64::from(value);
             shares += share;

@@ -15,6 +15,7 @@ use umbrage::visibility::Filter;
 use umbrage::{Aabb, Bounds, Camera, ClipDepth, Light, Options, Partition, Planner};
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
+    Timestamps,
 };
 use wgpu::BufferUsages;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -117,7 +118,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     //    its origin is zero; a camera-relative renderer would give the eye.
     let mut encoder = device.create_command_encoder(&Default::default());
     let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
-    shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, None, |map| {
+    shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, &Timestamps::default(), |map| {
         map.pass.set_pipeline(casters.pipeline());
         for (i, _) in (0..).zip(&boxes).filter(|(_, aabb)| map.map.may_cast(**aabb)) {
             draw(map.pass, i);

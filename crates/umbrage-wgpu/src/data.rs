@@ -35,6 +35,7 @@ pub(crate) struct Map {
     pub(crate) depth: Vec4,
     pub(crate) w: Vec4,
     pub(crate) fade_from: Vec4,
+    pub(crate) beam_scale: Vec4,
     pub(crate) size: [f32; 2],
     pub(crate) origin: [f32; 2],
     pub(crate) layer: u32,
@@ -141,6 +142,7 @@ impl Map {
             w: m.row(3).as_vec4(),
             // Nothing lies on the negative side of the plane that is at infinity.
             fade_from: map.fade_from.map_or(Vec4::W, plane),
+            beam_scale: beam_scale(map),
             size: place.size.map(|n| n as f32),
             origin: place.origin.map(|n| n as f32),
             layer: place.layer,
@@ -149,6 +151,41 @@ impl Map {
             index: index as u32,
         }
     }
+}
+
+/// `ShadowPrefilterMap`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct PrefilterMap {
+    pub(crate) beam_scale: Vec4,
+    pub(crate) origin: [f32; 2],
+    pub(crate) low: [i32; 2],
+    pub(crate) high: [i32; 2],
+    pub(crate) first_layer: u32,
+    pub(crate) padding: u32,
+}
+
+impl PrefilterMap {
+    /// A map whose numbers take `textures` layers.
+    pub(crate) fn new(map: &ShadowMap, place: &Place, gutter: u32, textures: u32) -> Self {
+        let low = place.origin.map(|n| n as i32 - gutter as i32);
+        let high = [0, 1].map(|i| low[i] + (place.size[i] + 2 * gutter) as i32 - 1);
+        Self {
+            beam_scale: beam_scale(map),
+            origin: place.origin.map(|n| n as f32),
+            low,
+            high,
+            first_layer: place.layer * textures,
+            padding: 0,
+        }
+    }
+}
+
+/// The fourth coordinate of what a map's beams consist of: per texel in s and in t, per depth, and at texel 0 and depth 0.
+fn beam_scale(map: &ShadowMap) -> Vec4 {
+    let w = map.local_from_shadow.row(3);
+    let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
+    DVec4::new(w.x / width, w.y / height, w.z, w.w).as_vec4()
 }
 
 /// From render space to a map's local space.

@@ -29,7 +29,7 @@
 //!
 //! ```no_run
 //! # use umbrage::*;
-//! # use umbrage_wgpu::{Casters, Frame, Shadows, ShadowOptions, Support};
+//! # use umbrage_wgpu::{Casters, Frame, Shadows, ShadowOptions, Support, Timestamps};
 //! # struct Model { aabb: Aabb }
 //! # impl Model { fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {} }
 //! # fn frame(adapter: &wgpu::Adapter, device: &wgpu::Device, queue: &wgpu::Queue, camera: &Camera, sun: Light,
@@ -44,7 +44,7 @@
 //! let frame = Frame { plan, render_origin: glam::DVec3::ZERO, casters: Casters::Still };
 //! let prepared = shadows.prepare(device, queue, &frame)?;
 //! let mut encoder = device.create_command_encoder(&Default::default());
-//! prepared.encode(&mut encoder, None, |map| {
+//! prepared.encode(&mut encoder, &Timestamps::default(), |map| {
 //!     map.pass.set_pipeline(caster_pipeline);
 //!     for model in models.iter().filter(|m| map.map.may_cast(m.aabb)) {
 //!         model.draw(map.pass);
@@ -69,6 +69,7 @@ mod casters;
 mod data;
 mod error;
 mod passes;
+mod prefilter;
 mod shadows;
 mod slots;
 mod support;
@@ -76,6 +77,6 @@ mod wgsl;
 
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
-pub use passes::{MapPass, Prepared};
+pub use passes::{MapPass, Prepared, Timestamps};
 pub use shadows::{Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, ShadowOptions, Shadows};
 pub use support::Support;

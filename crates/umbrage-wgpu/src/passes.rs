@@ -35,6 +35,31 @@ pub struct MapPass<'p, 'e> {
     pub render_origin: DVec3,
 }
 
+/// Where to write when passes begin and end.
+#[derive(Clone, Debug, Default)]
+pub struct Timestamps<'a> {
+    /// All that draws casters: the first pass begins, the last one ends.
+    pub depth: Option<RenderPassTimestampWrites<'a>>,
+    /// All that filters ahead of lookup.
+    pub filter: Option<RenderPassTimestampWrites<'a>>,
+}
+
+/// Of the timestamps of many passes, those that one of them writes.
+pub(crate) fn part<'a>(
+    all: Option<&RenderPassTimestampWrites<'a>>,
+    is_first: bool,
+    is_last: bool,
+) -> Option<RenderPassTimestampWrites<'a>> {
+    let all = all?;
+    let begin = all.beginning_of_pass_write_index.filter(|_| is_first);
+    let end = all.end_of_pass_write_index.filter(|_| is_last);
+    (begin.is_some() || end.is_some()).then_some(RenderPassTimestampWrites {
+        query_set: all.query_set,
+        beginning_of_pass_write_index: begin,
+        end_of_pass_write_index: end,
+    })
+}
+
 impl Prepared<'_> {
     /// Indices in the plan of the maps that will be drawn. Others are drawn already, or empty.
     pub fn stale(&self) -> impl Iterator<Item = usize> + '_ {
@@ -50,12 +75,12 @@ impl Prepared<'_> {
     pub fn encode(
         self,
         encoder: &mut CommandEncoder,
-        timestamps: Option<&RenderPassTimestampWrites<'_>>,
+        timestamps: &Timestamps<'_>,
         mut draw: impl FnMut(&mut MapPass<'_, '_>),
     ) -> usize {
         let Self { shadows, plan, render_origin } = self;
         let gutter = shadows.options().filter.reach_texels();
-        let Shadows { records, texture, clear, casters, .. } = shadows;
+        let Shadows { records, texture, clear, casters, prefiltering, .. } = shadows;
         let stale_in = |layer: usize| {
             records.iter().enumerate().filter_map(move |(index, record)| {
                 let place = record.stale_place().filter(|p| p.layer as usize == layer)?;
@@ -71,16 +96,9 @@ impl Prepared<'_> {
             let in_layer = |r: &&Record| r.place.is_some_and(|p| p.layer as usize == layer);
             let is_whole = records.iter().filter(in_layer).all(|r| r.stale_place().is_some());
             let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
-            let timestamps = timestamps.and_then(|t| {
-                let begin = t.beginning_of_pass_write_index.filter(|_| Some(layer) == first);
-                let end = t.end_of_pass_write_index.filter(|_| Some(layer) == last);
-                (begin.is_some() || end.is_some()).then_some(RenderPassTimestampWrites {
-                    query_set: t.query_set,
-                    beginning_of_pass_write_index: begin,
-                    end_of_pass_write_index: end,
-                })
-            });
-            let mut pass = begin(encoder, &texture.layers[layer], load, timestamps);
+            let [is_first, is_last] = [Some(layer) == first, Some(layer) == last];
+            let writes = part(timestamps.depth.as_ref(), is_first, is_last);
+            let mut pass = begin(encoder, &texture.layers[layer], load, writes);
             for (index, record, place) in stale_in(layer) {
                 aim(&mut pass, &place, gutter);
                 if !is_whole {
@@ -96,6 +114,12 @@ impl Prepared<'_> {
                     render_origin,
                 });
                 drawn += 1;
+            }
+            drop(pass);
+            if let Some(prefiltering) = prefiltering {
+                let stale = stale_in(layer).map(|(index, _, place)| (index, place));
+                let writes = part(timestamps.filter.as_ref(), is_first, is_last);
+                prefiltering.encode(encoder, layer, stale, gutter, writes.as_ref());
             }
         }
         for record in records.iter_mut() {
@@ -127,7 +151,7 @@ fn begin<'e>(
 }
 
 /// Sets viewport and scissor to a map with its gutter.
-fn aim(pass: &mut RenderPass<'_>, place: &Place, gutter: u32) {
+pub(crate) fn aim(pass: &mut RenderPass<'_>, place: &Place, gutter: u32) {
     let [x, y] = place.origin.map(|n| n - gutter);
     let [w, h] = place.size.map(|n| n + 2 * gutter);
     pass.set_viewport(x as f32, y as f32, w as f32, h as f32, 0.0, 1.0);

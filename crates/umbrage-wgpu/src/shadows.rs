@@ -1,5 +1,6 @@
 use crate::data::{CasterMap, Lookup, Placed, clip_from_render};
 use crate::passes::{Clear, Prepared};
+use crate::prefilter::Prefiltering;
 use crate::slots::Slots;
 use crate::wgsl::{self, MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
 use crate::{Error, Support, data};
@@ -21,7 +22,7 @@ use wgpu::{
 pub const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
 /// How shadow maps are held and looked up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShadowOptions {
     /// How the texels around a point are looked up.
     pub filter: Filter,
@@ -103,6 +104,8 @@ pub struct Shadows {
     lookup_layout: BindGroupLayout,
     lookup_bind_group: BindGroup,
     pub(crate) clear: Clear,
+    /// If the filter is applied ahead of lookup.
+    pub(crate) prefiltering: Option<Prefiltering>,
     /// One a map of the plan.
     pub(crate) records: Vec<Record>,
 }
@@ -187,7 +190,9 @@ impl Shadows {
             if support.depth_fetch { options.comparison } else { Comparison::Hardware };
         let options = ShadowOptions { comparison, ..*options };
         let filter_mode = match (comparison, options.filter) {
-            (Comparison::Hardware, Filter::Pcf { .. }) => FilterMode::Linear,
+            (Comparison::Hardware, Filter::Pcf { .. }) | (_, Filter::Prefiltered(_)) => {
+                FilterMode::Linear
+            }
             _ => FilterMode::Nearest,
         };
         let sampler = device.create_sampler(&SamplerDescriptor {
@@ -195,13 +200,18 @@ impl Shadows {
             mag_filter: filter_mode,
             min_filter: filter_mode,
             // Lit is what is not nearer to the light than the limit.
-            compare: (comparison == Comparison::Hardware).then_some(CompareFunction::LessEqual),
+            compare: compares(&options).then_some(CompareFunction::LessEqual),
             ..SamplerDescriptor::default()
         });
         let lookup_layout = lookup_layout(device, &support, &options);
         let buffers = Buffers::new(device, &support);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
-        let lookup_bind_group = buffers.bind(device, &lookup_layout, &texture, &sampler);
+        let prefiltering = match &options.filter {
+            Filter::Prefiltered(p) => Some(Prefiltering::new(device, &support, p, &texture)?),
+            _ => None,
+        };
+        let view = looked_up(&texture, prefiltering.as_ref());
+        let lookup_bind_group = buffers.bind(device, &lookup_layout, view, &sampler);
         Ok(Self {
             options,
             support,
@@ -216,6 +226,7 @@ impl Shadows {
             lookup_layout,
             lookup_bind_group,
             clear: Clear::new(device),
+            prefiltering,
             records: Vec::new(),
         })
     }
@@ -315,6 +326,11 @@ impl Shadows {
         self.slots.places().get(map).copied().flatten()
     }
 
+    /// Memory of what lookup samples, bytes: of depths, or of a filter's numbers in their place.
+    pub fn lookup_bytes(&self) -> u64 {
+        self.prefiltering.as_ref().map_or_else(|| self.texture_bytes(), Prefiltering::bytes)
+    }
+
     /// Memory of the depth texture, bytes.
     pub fn texture_bytes(&self) -> u64 {
         let Extent3d { width, height, depth_or_array_layers } = self.texture.texture.size();
@@ -359,12 +375,16 @@ impl Shadows {
         if !self.texture.holds(size, layers) {
             self.texture =
                 DepthTexture::new(device, &self.support, self.options.layout, size, layers);
+            if let Some(prefiltering) = &mut self.prefiltering {
+                prefiltering.resize(device, &self.support, &self.texture);
+            }
             rebind = true;
         }
         rebind |= self.buffers.hold(device, &self.support, &self.lookup);
         if rebind {
+            let view = looked_up(&self.texture, self.prefiltering.as_ref());
             self.lookup_bind_group =
-                self.buffers.bind(device, &self.lookup_layout, &self.texture, &self.sampler);
+                self.buffers.bind(device, &self.lookup_layout, view, &self.sampler);
         }
         if rebind || self.lookup != self.uploaded {
             self.buffers.upload(queue, &self.lookup);
@@ -391,6 +411,10 @@ impl Shadows {
         }
         if any_stale {
             self.casters.upload(device, queue, &self.records);
+            let Self { records, texture, prefiltering, .. } = &mut *self;
+            if let Some(prefiltering) = prefiltering {
+                prefiltering.upload(device, queue, plan, records, gutter, texture);
+            }
         }
         Ok(Prepared { shadows: self, plan, render_origin })
     }
@@ -432,6 +456,11 @@ impl DepthTexture {
         let all = view(view_dimension(layout), 0, None);
         let layers = (0..layers).map(|i| view(TextureViewDimension::D2, i, Some(1)));
         Self { all, layers: layers.collect(), texture, is_fresh: true }
+    }
+
+    /// Texels, width and height.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        [self.texture.width(), self.texture.height()]
     }
 
     /// Whether maps that need this much fit, and do not leave most of it unused.
@@ -492,7 +521,7 @@ impl Buffers {
         &self,
         device: &Device,
         layout: &BindGroupLayout,
-        texture: &DepthTexture,
+        texture: &TextureView,
         sampler: &wgpu::Sampler,
     ) -> BindGroup {
         let resources = [
@@ -500,7 +529,7 @@ impl Buffers {
             self.lights.as_entire_binding(),
             self.maps.as_entire_binding(),
             self.planes.as_entire_binding(),
-            BindingResource::TextureView(&texture.all),
+            BindingResource::TextureView(texture),
             BindingResource::Sampler(sampler),
         ];
         let entries = (0..).zip(resources);
@@ -567,6 +596,19 @@ impl CasterBuffer {
     }
 }
 
+/// Whether the texture unit compares depths.
+fn compares(options: &ShadowOptions) -> bool {
+    options.comparison == Comparison::Hardware && !matches!(options.filter, Filter::Prefiltered(_))
+}
+
+/// What lookup samples.
+fn looked_up<'a>(
+    depths: &'a DepthTexture,
+    prefiltering: Option<&'a Prefiltering>,
+) -> &'a TextureView {
+    prefiltering.map_or(&depths.all, Prefiltering::view)
+}
+
 fn view_dimension(layout: Layout) -> TextureViewDimension {
     match layout {
         Layout::Atlas => TextureViewDimension::D2,
@@ -602,14 +644,22 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         buffer(array),
         buffer(array),
         buffer(array),
-        BindingType::Texture {
-            sample_type: TextureSampleType::Depth,
-            view_dimension: view_dimension(options.layout),
-            multisampled: false,
+        match options.filter {
+            Filter::Prefiltered(_) => BindingType::Texture {
+                sample_type: TextureSampleType::Float { filterable: true },
+                view_dimension: TextureViewDimension::D2Array,
+                multisampled: false,
+            },
+            _ => BindingType::Texture {
+                sample_type: TextureSampleType::Depth,
+                view_dimension: view_dimension(options.layout),
+                multisampled: false,
+            },
         },
-        BindingType::Sampler(match options.comparison {
-            Comparison::PerTexel => SamplerBindingType::NonFiltering,
-            Comparison::Hardware => SamplerBindingType::Comparison,
+        BindingType::Sampler(match options.filter {
+            Filter::Prefiltered(_) => SamplerBindingType::Filtering,
+            _ if compares(options) => SamplerBindingType::Comparison,
+            _ => SamplerBindingType::NonFiltering,
         }),
     ];
     let entries = (0..).zip(types);

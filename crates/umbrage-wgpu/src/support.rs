@@ -1,5 +1,8 @@
 use crate::Error;
-use wgpu::{Adapter, Backend, Device, DownlevelFlags, Features, Limits};
+use wgpu::{
+    Adapter, Backend, Device, DownlevelFlags, Features, Limits, TextureFormat,
+    TextureFormatFeatureFlags, TextureUsages,
+};
 
 /// What a device can do, as far as shadows need it: the one place where that is decided.
 ///
@@ -9,6 +12,7 @@ use wgpu::{Adapter, Backend, Device, DownlevelFlags, Features, Limits};
 /// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold 16 lights, 64 maps and 512 planes |
 /// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` |
 /// | arrays of any number of layers (OpenGL) | a layer more for 1, 6, 12 … |
+/// | interpolated floats, 16-bit or signed 8-bit textures | [`Error::Unsupported`] for the filters that store their numbers so |
 /// | comparison samplers, where depths cannot be fetched | [`Error::Unsupported`] |
 ///
 /// Fields are public so that a fallback can be forced: set one to `false`.
@@ -20,6 +24,16 @@ pub struct Support {
     pub storage_buffers: bool,
     /// Whether shaders fetch single depths.
     pub depth_fetch: bool,
+    /// Whether textures of 32-bit floats are interpolated: for `vsm`, `esm`, `evsm`.
+    pub float32: bool,
+    /// Whether there are normalised 16-bit textures: for `msm`, and `csm` in 16 bits.
+    pub norm16: bool,
+    /// Whether signed 8-bit textures can be drawn into: for `csm`.
+    pub snorm8: bool,
+    /// Textures drawn into at a time.
+    pub max_attachments: u32,
+    /// Bytes that these take together, a texel.
+    pub max_attachment_bytes: u32,
     /// The longest side of a texture, texels.
     pub max_side: u32,
     /// Layers of a texture.
@@ -37,7 +51,10 @@ const STORAGE_BUFFERS: u32 = 3;
 impl Support {
     /// Features that make shadows faster. Ask for those of them that the adapter has when you create
     /// your device; none is needed.
-    pub const WANTED_FEATURES: Features = Features::DEPTH_CLIP_CONTROL;
+    pub const WANTED_FEATURES: Features = Features::DEPTH_CLIP_CONTROL
+        .union(Features::FLOAT32_FILTERABLE)
+        .union(Features::TEXTURE_FORMAT_16BIT_NORM)
+        .union(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
     /// What a device can do that was created from `adapter`.
     ///
@@ -45,10 +62,23 @@ impl Support {
     /// [`Error::Unsupported`] where shadows are out of its reach.
     pub fn new(adapter: &Adapter, device: &Device) -> Result<Self, Error> {
         let flags = adapter.get_downlevel_capabilities().flags;
-        Self::of(device.features(), &device.limits(), flags, adapter.get_info().backend)
+        let features = device.features();
+        let mut support = Self::of(features, &device.limits(), flags, adapter.get_info().backend)?;
+        // What the adapter says of a format counts only where the device was asked to heed it.
+        let is_heeded = features.contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
+        let can_filter = |format| {
+            let can = adapter.get_texture_format_features(format);
+            is_heeded
+                && can.allowed_usages.contains(TextureUsages::RENDER_ATTACHMENT)
+                && can.flags.contains(TextureFormatFeatureFlags::FILTERABLE)
+        };
+        support.snorm8 = can_filter(TextureFormat::Rgba8Snorm);
+        support.norm16 &=
+            can_filter(TextureFormat::Rgba16Unorm) && can_filter(TextureFormat::Rgba16Snorm);
+        Ok(support)
     }
 
-    /// The same from what [`new`](Self::new) asks the device.
+    /// The same from what [`new`](Self::new) asks the device, but for formats of textures, of which only an adapter knows.
     ///
     /// # Errors
     /// As for [`new`](Self::new).
@@ -79,6 +109,12 @@ impl Support {
             depth_clip_control: features.contains(Features::DEPTH_CLIP_CONTROL),
             storage_buffers,
             depth_fetch,
+            float32: features.contains(Features::FLOAT32_FILTERABLE),
+            norm16: features.contains(Features::TEXTURE_FORMAT_16BIT_NORM),
+            // Not among what every device has.
+            snorm8: false,
+            max_attachments: limits.max_color_attachments.max(1),
+            max_attachment_bytes: limits.max_color_attachment_bytes_per_sample,
             max_side: limits.max_texture_dimension_2d,
             max_layers: limits.max_texture_array_layers,
             any_layers: backend != Backend::Gl,

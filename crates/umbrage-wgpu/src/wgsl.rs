@@ -1,7 +1,9 @@
 //! Shader text, put together for a device, a filter and a bind group.
 
 use crate::{Comparison, Layout, ShadowOptions, Support};
-use umbrage::visibility::Filter;
+use std::ops::Range;
+use umbrage::visibility::statistic::Statistic;
+use umbrage::visibility::{Filter, Prefilter};
 
 /// What a device without storage buffers can be told of: sizes of the uniform arrays.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -12,14 +14,16 @@ pub(crate) const MAX_PLANES: usize = 512;
 pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool) -> String {
     let ShadowOptions { filter, comparison, layout } = *options;
     // Only in layers do shaders need to be told which.
-    let (texture, layer) = match layout {
-        Layout::Atlas => ("", ""),
-        Layout::Layers => ("_array", ", shadow_maps[map].layer"),
+    let (depths, layer) = match layout {
+        Layout::Atlas => ("texture_depth_2d", ""),
+        Layout::Layers => ("texture_depth_2d_array", ", shadow_maps[map].layer"),
     };
+    let is_prefiltered = matches!(filter, Filter::Prefiltered(_));
+    let texture = if is_prefiltered { "texture_2d_array<f32>" } else { depths };
     let array = |n: usize| if storage_buffers { String::new() } else { format!(", {n}") };
     let sampler = match comparison {
-        Comparison::PerTexel => "sampler",
-        Comparison::Hardware => "sampler_comparison",
+        Comparison::Hardware if !is_prefiltered => "sampler_comparison",
+        _ => "sampler",
     };
     let bindings = include_str!("wgsl/bindings.wgsl")
         .replace("{GROUP}", &group.to_string())
@@ -28,8 +32,11 @@ pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool)
         .replace("{MAPS}", &array(MAX_MAPS))
         .replace("{PLANES}", &array(MAX_PLANES))
         .replace("{SAMPLER}", sampler)
-        .replace("{ARRAY}", texture);
+        .replace("{TEXTURE}", texture);
     let mut text = format!("{}\n{bindings}\n", include_str!("wgsl/lookup.wgsl"));
+    if let Filter::Prefiltered(prefilter) = filter {
+        return text + &prefiltered(&prefilter, layout);
+    }
     if comparison == Comparison::Hardware {
         text += include_str!("wgsl/hardware.wgsl");
         text += "\n";
@@ -49,6 +56,105 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
         Filter::Pcf { n } => pcf.replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string()),
         _ => hard.to_owned(),
     }
+}
+
+/// Looks up what was filtered ahead.
+fn prefiltered(prefilter: &Prefilter, layout: Layout) -> String {
+    let textures = textures(&prefilter.statistic);
+    let first = match layout {
+        Layout::Atlas => "0u".to_owned(),
+        Layout::Layers => format!("{textures}u * shadow_maps[map].layer"),
+    };
+    let deviation = prefilter.statistic.plane_deviations() * prefilter.deviation_texels() as f32;
+    statistic(&prefilter.statistic)
+        + &include_str!("wgsl/prefiltered.wgsl")
+            .replace("{FIRST_LAYER}", &first)
+            .replace("{TEXTURES}", &textures.to_string())
+            .replace("{PLANE_DEVIATION}", &number(deviation))
+}
+
+/// Textures that a statistic's numbers take, at most four to each.
+pub(crate) fn textures(statistic: &Statistic) -> u32 {
+    statistic.channels().div_ceil(4) as u32
+}
+
+/// A number as WGSL has it: every digit, and a point.
+fn number(value: f32) -> String {
+    format!("{value:?}")
+}
+
+/// `shadow_encode` and `shadow_reconstruct` of a statistic, with what they need. The files are twins of those of the same name in
+/// `umbrage::visibility::statistic`.
+fn statistic(statistic: &Statistic) -> String {
+    let chebyshev = include_str!("wgsl/chebyshev.wgsl");
+    let own = match statistic {
+        Statistic::Vsm(s) => include_str!("wgsl/vsm.wgsl").replace("{LEAK}", &number(s.leak)),
+        Statistic::Esm(s) => {
+            include_str!("wgsl/esm.wgsl").replace("{EXPONENT}", &number(s.exponent))
+        }
+        Statistic::Evsm(s) => include_str!("wgsl/evsm.wgsl")
+            .replace("{EXPONENT}", &number(s.exponent))
+            .replace("{COMPONENTS}", &s.components.to_string())
+            .replace("{LEAK}", &number(s.leak)),
+        Statistic::Msm(s) => include_str!("wgsl/msm.wgsl").replace("{LEAK}", &number(s.leak)),
+        Statistic::Csm(s) => {
+            let mut amounts: Vec<f32> = s.terms().map(|[_, amount]| amount).collect();
+            amounts.resize(amounts.len().next_multiple_of(2), 0.0);
+            let pairs = amounts.chunks(2).map(|a| format!("vec2f({:?}, {:?})", a[0], a[1]));
+            let rate = s.terms().next().map_or(0.0, |[rate, _]| rate);
+            include_str!("wgsl/csm.wgsl")
+                .replace("{RATE}", &number(rate))
+                .replace("{AMOUNTS}", &pairs.collect::<Vec<_>>().join(", "))
+                .replace("{SHIFT}", &number(s.shift() / s.shrink()))
+                .replace("{GAIN}", &number(s.gain()))
+        }
+        // The core's list is open to it alone.
+        _ => String::new(),
+    };
+    let textures = textures(statistic).to_string();
+    [include_str!("wgsl/linear.wgsl"), chebyshev, &own.replace("{TEXTURES}", &textures), ""]
+        .join("\n")
+}
+
+/// A pass of a prefilter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PrefilterPass {
+    /// From depths to numbers.
+    Encode,
+    /// Along rows, then along columns.
+    Rows,
+    Columns,
+}
+
+/// The module of a pass that writes the textures in `range`, of those that the numbers take.
+pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range<u32>) -> String {
+    let outputs = (0..range.len()).map(|i| format!("    @location({i}) t{i}: vec4f,"));
+    let outputs = outputs.collect::<Vec<_>>().join("\n");
+    let is_encode = pass == PrefilterPass::Encode;
+    let values = range.map(|i| {
+        if is_encode {
+            format!("numbers[{i}]")
+        } else {
+            format!("shadow_blurred(texel, layer + {i}u)")
+        }
+    });
+    let values = values.collect::<Vec<_>>().join(", ");
+    let direction = if pass == PrefilterPass::Rows { "1, 0" } else { "0, 1" };
+    let weights: Vec<f32> = prefilter.weights().collect();
+    let taps = weights.iter().enumerate().skip(1).map(|(k, w)| {
+        let tap = |sign| {
+            let at = format!("clamp(at {sign} {k} * direction, low, high)");
+            format!("textureLoad(shadow_prefilter_source, {at}, layer, 0)")
+        };
+        format!("    sum += {w:?} * ({} + {});", tap("-"), tap("+"))
+    });
+    let text = choose(include_str!("wgsl/prefilter.wgsl"), &[("ENCODE", is_encode)])
+        .replace("{OUTPUTS}", &outputs)
+        .replace("{VALUES}", &values)
+        .replace("{DIRECTION}", direction)
+        .replace("{WEIGHT_0}", &number(weights[0]))
+        .replace("{TAPS}", &taps.collect::<Vec<_>>().join("\n"));
+    if is_encode { statistic(&prefilter.statistic) + &text } else { text }
 }
 
 /// The casters' module, its binding in bind group `group`.
@@ -100,11 +206,17 @@ mod tests {
     use crate::data;
     use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
     use std::mem::{offset_of, size_of};
+    use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Vsm};
 
     const SUPPORT: Support = Support {
         depth_clip_control: true,
         storage_buffers: true,
         depth_fetch: true,
+        float32: true,
+        norm16: true,
+        snorm8: true,
+        max_attachments: 8,
+        max_attachment_bytes: 32,
         max_side: 8192,
         max_layers: 256,
         any_layers: true,
@@ -120,6 +232,36 @@ mod tests {
         (module, info)
     }
 
+    fn statistics() -> Vec<Statistic> {
+        let csm = |m| Statistic::Csm(Csm::new(m, 0.5, true, false).unwrap());
+        vec![
+            Statistic::Vsm(Vsm::default()),
+            Statistic::Esm(Esm::default()),
+            Statistic::Evsm(Evsm::default()),
+            Statistic::Evsm(Evsm { components: 2, ..Evsm::default() }),
+            Statistic::Msm(Msm::default()),
+            csm(1),
+            csm(3),
+            csm(16),
+        ]
+    }
+
+    #[test]
+    fn every_pass_of_a_prefilter_is_valid() {
+        for statistic in statistics() {
+            for blur_texels in [1, 3, 63] {
+                let filter = Prefilter { statistic, blur_texels };
+                let all = textures(&statistic);
+                for range in [0..all, 0..1, all - 1..all] {
+                    for pass in [PrefilterPass::Encode, PrefilterPass::Rows, PrefilterPass::Columns]
+                    {
+                        validated(&prefilter(&filter, pass, range.clone()));
+                    }
+                }
+            }
+        }
+    }
+
     /// A user's shader: everything that may be called is, from a fragment shader.
     const USER: &str = "
         @fragment
@@ -130,7 +272,11 @@ mod tests {
         }";
 
     fn variants() -> impl Iterator<Item = (ShadowOptions, bool)> {
+        let prefiltered = statistics()
+            .into_iter()
+            .map(|statistic| Filter::Prefiltered(Prefilter { statistic, blur_texels: 7 }));
         let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
+        let filters = filters.chain(prefiltered);
         let with = |filter| {
             let comparisons = [Comparison::PerTexel, Comparison::Hardware];
             comparisons.into_iter().flat_map(move |comparison| {
@@ -213,10 +359,39 @@ mod tests {
             m,
             "ShadowMap",
             data::Map,
-            [s, t, depth, w, fade_from, size, origin, layer, first_plane, plane_count, index]
+            [
+                s,
+                t,
+                depth,
+                w,
+                fade_from,
+                beam_scale,
+                size,
+                origin,
+                layer,
+                first_plane,
+                plane_count,
+                index
+            ]
         );
         let (module, _) = validated(&mesh(&SUPPORT, true));
         check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
+        let text = prefilter(
+            &Prefilter { statistic: statistics()[0], blur_texels: 3 },
+            PrefilterPass::Rows,
+            0..1,
+        );
+        let (own, _) = validated(&text);
+        let (members, span) = layout(&own, "ShadowPrefilterMap");
+        let ours = [
+            offset_of!(data::PrefilterMap, beam_scale),
+            offset_of!(data::PrefilterMap, origin),
+            offset_of!(data::PrefilterMap, low),
+            offset_of!(data::PrefilterMap, high),
+            offset_of!(data::PrefilterMap, first_layer),
+        ];
+        assert_eq!(members.iter().map(|m| m.1).collect::<Vec<_>>(), ours);
+        assert_eq!(span, size_of::<data::PrefilterMap>());
         check_layout!(&module, "ShadowMask", data::Mask, [factor, cutoff]);
     }
 

@@ -6,7 +6,7 @@ use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Partition, Planner};
-use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Support};
+use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Support, Timestamps};
 
 struct Counting;
 
@@ -62,7 +62,7 @@ fn a_still_frame_allocates_nothing() {
         let before = ALLOCATIONS.with(Cell::get);
         let frame = Frame { plan, render_origin: DVec3::ZERO, casters };
         let prepared = shadows.prepare(&device, &queue, &frame).unwrap();
-        let drawn = prepared.encode(&mut encoder, None, |_| {});
+        let drawn = prepared.encode(&mut encoder, &Timestamps::default(), |_| {});
         counts.push((drawn, ALLOCATIONS.with(Cell::get) - before));
     }
     assert!(counts[0].0 == 4 && counts[0].1 > 0, "counting works: {counts:?}");

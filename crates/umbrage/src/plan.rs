@@ -248,6 +248,20 @@ impl ShadowMap {
         (h.w > 0.0).then(|| h.xyz() / h.w)
     }
 
+    /// Depth as a share of the way along the beam through (s, t), 0 and 1 being where the map's depths begin and end. Under parallel light it
+    /// is depth itself; a lamp's perspective makes depth grow ever slower. Where depth 1 is beyond infinity, depth itself.
+    pub fn linear_depth(&self, st: DVec2, depth: f64) -> f64 {
+        let [begin, step] = self.beam_scale(st);
+        let end = begin + step;
+        if begin > 0.0 && end > 0.0 { depth * end / (begin + step * depth) } else { depth }
+    }
+
+    /// The fourth coordinate of the points of a beam: where depth is 0, and its growth to where depth is 1.
+    pub(crate) fn beam_scale(&self, st: DVec2) -> [f64; 2] {
+        let w = self.local_from_shadow.row(3);
+        [w.x * st.x + w.y * st.y + w.w, w.z]
+    }
+
     /// The beam through (s, t). Slightly outside [0, 1]² is fine; `None` where no point has these
     /// coordinates (beyond the warp's horizon).
     pub fn beam(&self, st: DVec2) -> Option<Beam> {

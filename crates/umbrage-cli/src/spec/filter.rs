@@ -1,9 +1,11 @@
 //! The filter of a specification: `hard`, `pcf5`, `csm8(blur=7,attenuation=1,offset)`.
 
 use super::{nearest, parse_count, split_once, split_options};
-use anyhow::{Error, Result, bail, ensure};
+use anyhow::{Error, Result, anyhow, bail, ensure};
 use std::fmt::{self, Display};
 use std::str::FromStr;
+use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
+use umbrage::visibility::{self, Prefilter};
 
 /// How a shadow map is looked up.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,8 +29,10 @@ pub(crate) enum BlurredKind {
     Vsm,
     /// Exponential.
     Esm,
-    /// Exponential variance.
+    /// Exponential variance, four numbers.
     Evsm,
+    /// The same with two.
+    Evsm2,
     /// Four moments.
     Msm,
 }
@@ -38,6 +42,12 @@ pub(crate) enum BlurredKind {
 pub(crate) enum FilterOption {
     /// `blur=N`: width of the filter, texels.
     Blur(u32),
+    /// `leak=L`: what visibility is taken for shadow.
+    Leak(f64),
+    /// `exponent=C`: how steep an exponential is.
+    Exponent(f64),
+    /// `bits=N` of each stored number.
+    Bits(u32),
     /// `attenuation=A` of the higher terms.
     Attenuation(f64),
     /// `offset`: look up a little nearer, so that lit surfaces are bright.
@@ -46,7 +56,88 @@ pub(crate) enum FilterOption {
     Scale,
 }
 
-const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "msm", "csm", "pcss"];
+const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "evsm2", "msm", "csm", "pcss"];
+
+impl Filter {
+    /// What executes it, or why this version cannot.
+    pub(super) fn executable(&self) -> Result<visibility::Filter> {
+        let (statistic, options) = match self {
+            Self::Hard => return Ok(visibility::Filter::Hard),
+            Self::Pcf(n) => return Ok(visibility::Filter::pcf(*n)?),
+            Self::Pcss => {
+                bail!("`pcss` is not available in this version; `pcfN` and the blurred filters are")
+            }
+            Self::Blurred(kind, options) => (kind.statistic(options), options),
+            Self::Csm(order, options) => (csm(*order, options)?, options),
+        };
+        let blur = options.iter().find_map(|o| match o {
+            FilterOption::Blur(n) => Some(*n),
+            _ => None,
+        });
+        let prefilter = Prefilter { statistic, blur_texels: blur.unwrap_or(1) };
+        prefilter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
+        Ok(visibility::Filter::Prefiltered(prefilter))
+    }
+}
+
+impl BlurredKind {
+    /// Options that it does not have are not there.
+    fn statistic(self, options: &[FilterOption]) -> Statistic {
+        let leak = options.iter().find_map(|o| match o {
+            FilterOption::Leak(leak) => Some(*leak as f32),
+            _ => None,
+        });
+        let exponent = options.iter().find_map(|o| match o {
+            FilterOption::Exponent(c) => Some(*c as f32),
+            _ => None,
+        });
+        let leak = leak.unwrap_or(0.0);
+        let evsm = |components| {
+            let exponent = exponent.unwrap_or(Evsm::MAX_EXPONENT);
+            Statistic::Evsm(Evsm { components, exponent, leak })
+        };
+        match self {
+            Self::Vsm => Statistic::Vsm(Vsm { leak }),
+            Self::Esm => {
+                Statistic::Esm(exponent.map_or_else(Esm::default, |exponent| Esm { exponent }))
+            }
+            Self::Evsm => evsm(4),
+            Self::Evsm2 => evsm(2),
+            Self::Msm => Statistic::Msm(Msm { leak }),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Vsm => "vsm",
+            Self::Esm => "esm",
+            Self::Evsm => "evsm",
+            Self::Evsm2 => "evsm2",
+            Self::Msm => "msm",
+        }
+    }
+
+    /// Options that go in its parentheses.
+    fn known(self) -> &'static [&'static str] {
+        match self {
+            Self::Vsm | Self::Msm => &["blur=N", "leak=L"],
+            Self::Esm => &["blur=N", "exponent=C"],
+            Self::Evsm | Self::Evsm2 => &["blur=N", "leak=L", "exponent=C"],
+        }
+    }
+}
+
+fn csm(order: u32, options: &[FilterOption]) -> Result<Statistic> {
+    let has = |option: &FilterOption| options.contains(option);
+    let attenuation = options.iter().find_map(|o| match o {
+        FilterOption::Attenuation(a) => Some(*a as f32),
+        _ => None,
+    });
+    // Lit surfaces half dark are of no use; of the two cures doubling is wrong in fewer pixels.
+    let [offset, scale] = [has(&FilterOption::Offset), has(&FilterOption::Scale)];
+    let csm = Csm::new(order, attenuation.unwrap_or(0.0), offset, scale || !offset)?;
+    Ok(Statistic::Csm(if has(&FilterOption::Bits(16)) { csm.in_16_bits() } else { csm }))
+}
 
 impl FromStr for Filter {
     type Err = Error;
@@ -67,8 +158,15 @@ impl FromStr for Filter {
             None => Ok(()),
             Some(_) => bail!("`{text}`: `{stem}` takes no options"),
         };
-        let blurred = |kind| plain(Self::Blurred(kind, parse_options(options, stem, &["blur=N"])?));
+        let blurred = |kind: BlurredKind| {
+            plain(Self::Blurred(kind, parse_options(options, stem, kind.known())?))
+        };
         match stem {
+            // Its number is part of its name.
+            "evsm" if number == "2" => {
+                let options = parse_options(options, name, BlurredKind::Evsm2.known())?;
+                Ok(Self::Blurred(BlurredKind::Evsm2, options))
+            }
             "hard" => no_options().and_then(|()| plain(Self::Hard)),
             "pcf" => no_options().and_then(|()| Ok(Self::Pcf(numbered(1..=15)?))),
             "pcss" => no_options().and_then(|()| plain(Self::Pcss)),
@@ -77,7 +175,7 @@ impl FromStr for Filter {
             "evsm" => blurred(BlurredKind::Evsm),
             "msm" => blurred(BlurredKind::Msm),
             "csm" => {
-                let known = ["blur=N", "attenuation=A", "offset", "scale"];
+                let known = ["blur=N", "attenuation=A", "offset", "scale", "bits=16"];
                 Ok(Self::Csm(numbered(1..=16)?, parse_options(options, stem, &known)?))
             }
             _ => bail!(
@@ -100,12 +198,7 @@ impl Display for Filter {
             Self::Pcf(n) => return write!(f, "pcf{n}"),
             Self::Pcss => return f.write_str("pcss"),
             Self::Blurred(kind, options) => {
-                f.write_str(match kind {
-                    BlurredKind::Vsm => "vsm",
-                    BlurredKind::Esm => "esm",
-                    BlurredKind::Evsm => "evsm",
-                    BlurredKind::Msm => "msm",
-                })?;
+                f.write_str(kind.name())?;
                 options
             }
             Self::Csm(m, options) => {
@@ -117,6 +210,9 @@ impl Display for Filter {
             f.write_str(if i == 0 { "(" } else { "," })?;
             match option {
                 FilterOption::Blur(texels) => write!(f, "blur={texels}")?,
+                FilterOption::Leak(leak) => write!(f, "leak={leak}")?,
+                FilterOption::Exponent(c) => write!(f, "exponent={c}")?,
+                FilterOption::Bits(n) => write!(f, "bits={n}")?,
                 FilterOption::Attenuation(a) => write!(f, "attenuation={a}")?,
                 FilterOption::Offset => f.write_str("offset")?,
                 FilterOption::Scale => f.write_str("scale")?,
@@ -137,7 +233,25 @@ fn parse_options(text: Option<&str>, filter: &str, known: &[&str]) -> Result<Vec
                 "unknown option `{part}` of `{filter}`: did you mean `{}`?",
                 nearest(part, known)
             ),
-            ("blur", Some(n)) => FilterOption::Blur(parse_count(n, "blur=", 1..=63)?),
+            ("blur", Some(n)) => {
+                let n = parse_count(n, "blur=", 1..=Prefilter::MAX_BLUR)?;
+                ensure!(n % 2 == 1, "`blur={n}` must be an odd number of texels");
+                FilterOption::Blur(n)
+            }
+            ("leak", Some(leak)) => match leak.parse::<f64>() {
+                Ok(l) if (0.0..1.0).contains(&l) => FilterOption::Leak(l),
+                _ => bail!("`leak={leak}` must be a number of 0 to less than 1"),
+            },
+            ("exponent", Some(c)) => match c.parse::<f64>() {
+                Ok(c) if c > 0.0 && c <= f64::from(Esm::MAX_EXPONENT) => FilterOption::Exponent(c),
+                _ => {
+                    bail!("`exponent={c}` must be a number above 0, at most {}", Esm::MAX_EXPONENT)
+                }
+            },
+            ("bits", Some(n)) => {
+                ensure!(n == "16", "`bits={n}` must be 16; 8 are the default");
+                FilterOption::Bits(16)
+            }
             ("attenuation", Some(a)) => match a.parse::<f64>() {
                 Ok(a) if a >= 0.0 && a.is_finite() => FilterOption::Attenuation(a),
                 _ => bail!("`attenuation={a}` must be a number of at least 0"),

@@ -222,15 +222,25 @@ fn warp() -> impl Strategy<Value = Warp> {
 }
 
 fn filter() -> impl Strategy<Value = Filter> {
+    let blur = || (0u32..32).prop_map(|n| FilterOption::Blur(2 * n + 1));
     let blurred = |kind| {
-        proptest::collection::vec((1u32..64).prop_map(FilterOption::Blur), 0..=1)
-            .prop_map(move |o| Filter::Blurred(kind, o))
+        let leak = (0.0..1.0).prop_map(FilterOption::Leak);
+        let exponent = (1e-3..80.0).prop_map(FilterOption::Exponent);
+        let own = match kind {
+            BlurredKind::Esm => exponent.boxed(),
+            _ => leak.boxed(),
+        };
+        let options = (proptest::option::of(blur()), proptest::option::of(own));
+        options.prop_map(move |(blur, own)| {
+            Filter::Blurred(kind, [own, blur].into_iter().flatten().collect())
+        })
     };
     let csm_options = (
-        proptest::option::of((1u32..64).prop_map(FilterOption::Blur)),
+        proptest::option::of(blur()),
         proptest::option::of((0.0..1e3).prop_map(FilterOption::Attenuation)),
         proptest::option::of(Just(FilterOption::Offset)),
         proptest::option::of(Just(FilterOption::Scale)),
+        proptest::option::of(Just(FilterOption::Bits(16))),
     );
     prop_oneof![
         Just(Filter::Hard),
@@ -239,9 +249,10 @@ fn filter() -> impl Strategy<Value = Filter> {
         blurred(BlurredKind::Vsm),
         blurred(BlurredKind::Esm),
         blurred(BlurredKind::Evsm),
+        blurred(BlurredKind::Evsm2),
         blurred(BlurredKind::Msm),
-        (1u32..=16, csm_options).prop_map(|(m, (blur, attenuation, offset, scale))| {
-            Filter::Csm(m, [scale, blur, attenuation, offset].into_iter().flatten().collect())
+        (1u32..=16, csm_options).prop_map(|(m, (blur, attenuation, offset, scale, bits))| {
+            Filter::Csm(m, [scale, blur, attenuation, bits, offset].into_iter().flatten().collect())
         }),
     ]
 }

@@ -94,8 +94,15 @@ fn shared_options() {
             &["--max-error", "1", "--shadows", "psm@512"],
             "--max-error: `psm@512` says how many texels",
         ),
-        (&["--shadows", "lispsm:vsm"], "not available in this version"),
-        (&["--shadows", "lispsm:csm8(blur=7,offset)"], "not available in this version"),
+        (&["--shadows", "lispsm:pcss"], "not available in this version"),
+        (&["--shadows", "lispsm:vsm(blur=8)"], "`blur=8` must be an odd number of texels"),
+        (&["--shadows", "lispsm:vsm(blur=65)"], "from 1 to 63"),
+        (&["--shadows", "lispsm:vsm(leak=1)"], "`leak=1` must be a number of 0 to less than 1"),
+        (&["--shadows", "lispsm:esm(exponent=99)"], "`exponent=99` must be a number above 0"),
+        (&["--shadows", "lispsm:csm8(bits=12)"], "`bits=12` must be 16"),
+        (&["--shadows", "lispsm:csm17"], "from 1 to 16"),
+        (&["--shadows", "lispsm:evsm3"], "`evsm` takes no number"),
+        (&["--shadows", "lispsm:msm(exponent=3)"], "unknown option `exponent=3` of `msm`"),
         (&["--shadwos", "uniform"], "'--shadwos'"),
     ] {
         for command in [&RENDER[..], &COMPARE, &PLAN] {

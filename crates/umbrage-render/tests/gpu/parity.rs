@@ -2,7 +2,8 @@
 
 use crate::{GPU, Set, scene};
 use glam::DVec3;
-use umbrage::visibility::Filter;
+use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
+use umbrage::visibility::{Filter, Prefilter};
 use umbrage::{
     Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
 };
@@ -249,6 +250,37 @@ fn every_fallback_draws_the_same_picture() {
             "{filter}: {}",
             by_option.visibility
         );
+    }
+}
+
+/// What is filtered ahead of lookup, in four scenes, under an even map, a warp and slices.
+#[test]
+fn every_prefilter_in_four_scenes() {
+    let csm = |m| Statistic::Csm(Csm::new(m, 0.0, false, true).unwrap());
+    let statistics = [
+        Statistic::Vsm(Vsm::default()),
+        Statistic::Esm(Esm::default()),
+        Statistic::Evsm(Evsm::default()),
+        Statistic::Evsm(Evsm { components: 2, ..Evsm::default() }),
+        Statistic::Msm(Msm::default()),
+        csm(4),
+        csm(16),
+    ];
+    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+        let scene = scene(name);
+        let set = Set::new(&scene, IMAGE);
+        let light = set.light();
+        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+        for (i, statistic) in statistics.into_iter().enumerate() {
+            let (technique, options) = techniques()[[1, 4, 7][i % 3]];
+            let plan = set.plan(&[light], &options);
+            let filter = Filter::Prefiltered(Prefilter { statistic, blur_texels: 5 });
+            let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
+            let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
+            let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
+            let difference = compare(&set, &plan, (0, &light), filter, &samples, &reference);
+            check(name, technique, filter, &difference);
+        }
     }
 }
 

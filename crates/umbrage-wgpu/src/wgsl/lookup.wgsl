@@ -36,6 +36,8 @@ struct ShadowMap {
     w: vec4f,
     // Before this plane's negative side the map does not fade.
     fade_from: vec4f,
+    // See `shadow_linear_depth`.
+    beam_scale: vec4f,
     // Texels of the map, and of the texture at which it begins.
     size: vec2f,
     origin: vec2f,

@@ -4,7 +4,7 @@ use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
 use umbrage::{Aabb, Options, Partition, Plan, Planner, Size, Warp};
-use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows};
+use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 fn shadows(bench: &Bench, layout: Layout) -> Shadows {
     let options = ShadowOptions { layout, ..ShadowOptions::default() };
@@ -22,7 +22,7 @@ fn drawn(bench: &Bench, shadows: &mut Shadows, plan: &Plan, casters: Casters<'_>
     let stale: Vec<usize> = prepared.stale().collect();
     let mut encoder = bench.encoder();
     let mut drawn = Vec::new();
-    let count = prepared.encode(&mut encoder, None, |map| drawn.push(map.index));
+    let count = prepared.encode(&mut encoder, &Timestamps::default(), |map| drawn.push(map.index));
     assert_eq!((count, &stale), (drawn.len(), &drawn));
     bench.finish(encoder);
     drawn
@@ -90,7 +90,7 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
         let frame = Frame { plan: &plan, render_origin: plan.origin, casters };
         let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
         let mut encoder = bench.encoder();
-        prepared.encode(&mut encoder, None, |map| {
+        prepared.encode(&mut encoder, &Timestamps::default(), |map| {
             map.pass.set_pipeline(&own);
             if draws {
                 map.pass.draw(0..3, 0..1);
@@ -135,7 +135,7 @@ fn a_camera_that_wanders_needs_few_textures() {
         let frame = Frame { plan, render_origin: plan.origin, casters: Casters::Still };
         let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
         let mut encoder = bench.encoder();
-        prepared.encode(&mut encoder, None, |_| {});
+        prepared.encode(&mut encoder, &Timestamps::default(), |_| {});
         bench.finish(encoder);
         for (i, map) in plan.maps.iter().enumerate() {
             assert_eq!(

@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use umbrage::{Options, Partition, Size, Warp};
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
+    Timestamps,
 };
 use wgpu::BufferUsages;
 
@@ -43,7 +44,7 @@ fn depths(emulated: bool, warp: Warp) -> Vec<f32> {
     let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
     let mut encoder = bench.encoder();
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
-    let drawn = prepared.encode(&mut encoder, None, |map| {
+    let drawn = prepared.encode(&mut encoder, &Timestamps::default(), |map| {
         map.pass.set_pipeline(casters.pipeline());
         map.pass.set_vertex_buffer(0, vertices.slice(..));
         map.pass.set_vertex_buffer(1, instance.slice(..));

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 use umbrage::visibility::{Filter, texel_coordinates, visibility};
 use umbrage::{Faces, Objective, Options, Partition, Plan, Size, Splits, Warp};
-use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows};
+use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
@@ -115,7 +115,7 @@ fn random_depths(
     let frame = Frame { plan, render_origin: origin, casters: Casters::Moved };
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
     let mut encoder = bench.encoder();
-    prepared.encode(&mut encoder, None, |map| {
+    prepared.encode(&mut encoder, &Timestamps::default(), |map| {
         map.pass.set_pipeline(&pipeline);
         map.pass.draw(0..3, 0..1);
     });

@@ -4,6 +4,7 @@ mod caching;
 mod clamping;
 mod device;
 mod kernels;
+mod statistics;
 mod trouble;
 
 use device::Bench;

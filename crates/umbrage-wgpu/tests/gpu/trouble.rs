@@ -5,7 +5,9 @@ use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
 use umbrage::visibility::Filter;
 use umbrage::{Faces, Options, Partition, Size, Warp};
-use umbrage_wgpu::{Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support};
+use umbrage_wgpu::{
+    Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
+};
 
 fn prepare(
     bench: &Bench,
@@ -73,7 +75,7 @@ fn a_lost_device_does_not_panic() {
         let frame = Frame { plan: &plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
         let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
         let mut encoder = bench.encoder();
-        prepared.encode(&mut encoder, None, |_| {});
+        prepared.encode(&mut encoder, &Timestamps::default(), |_| {});
         bench.queue.submit([encoder.finish()]);
     }
     Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();

@@ -26,9 +26,23 @@
 //! surfaces are steep to it; the smaller of the two 0.0089; half of h 0.0087. Most of what is left is
 //! the texels' stair-steps.
 
+//!
+//! # Filters that are applied ahead of lookup
+//!
+//! [`Prefilter`] stores numbers in place of depth whose means over many texels tell the lit share ([`statistic`]). They are blurred once a map,
+//! and a lookup is one bilinear sample. The same slack applies. What cannot tell the receiver's own slanted plane from
+//! occluders also allows for a multiple of that plane's deviation over the filter.
+
+pub mod statistic;
+
+mod prefilter;
+
+pub use prefilter::Prefilter;
+
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
+use statistic::Channels;
 use std::fmt;
 
 /// Half a unit in the last place of single precision below 1.
@@ -38,7 +52,7 @@ const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
 const ROUNDING: f64 = 1e-6;
 
 /// How the texels around a point are looked up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Filter {
     /// The nearest texel.
@@ -52,6 +66,26 @@ pub enum Filter {
         /// Width of the box, texels, even or odd; clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
     },
+    /// Numbers in place of depths, blurred ahead of lookup.
+    Prefiltered(Prefilter),
+}
+
+/// The texels of a map, for lookups. A function from (i, j) to depth is one: it is asked for as many depths as a filter needs.
+pub trait Texels {
+    /// Depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
+    fn depth(&self, i: i32, j: i32) -> f32;
+
+    /// What a prefiltered map has at a point in texel coordinates, between texels bilinearly. By default computed there and then, from the
+    /// depths around.
+    fn statistics(&self, map: &ShadowMap, prefilter: &Prefilter, texel: DVec2) -> Channels {
+        prefilter.sample(map, texel, |i, j| self.depth(i, j))
+    }
+}
+
+impl<F: Fn(i32, i32) -> f32> Texels for F {
+    fn depth(&self, i: i32, j: i32) -> f32 {
+        self(i, j)
+    }
 }
 
 impl Filter {
@@ -74,16 +108,18 @@ impl Filter {
         match self {
             Self::Hard => 0,
             Self::Pcf { n } => n.clamp(1, Self::MAX_PCF) / 2 + 1,
+            Self::Prefiltered(prefilter) => prefilter.reach_texels(),
         }
     }
 }
 
-/// As in a shadow specification: `hard`, `pcf5`.
+/// As in a shadow specification: `hard`, `pcf5`, `csm8`.
 impl fmt::Display for Filter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Hard => f.write_str("hard"),
             Self::Pcf { n } => write!(f, "pcf{n}"),
+            Self::Prefiltered(prefilter) => prefilter.statistic.fmt(f),
         }
     }
 }
@@ -94,14 +130,14 @@ pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
     DVec2::new(st.x * width, map.rows.row_from_t(st.y) * height)
 }
 
-/// How much of the light reaches `receiver`, from 0 to 1, by the depths of `map`'s texels. `fetch`
-/// gives the depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
-/// Receivers outside the map, or before its depths, are lit.
+/// How much of the light reaches `receiver`, from 0 to 1, by `map`'s texels: a function from (i, j) to depth, also of those up to
+/// [`Filter::reach_texels`] outside the map, or what holds more than depths. Receivers outside the map, or before its
+/// depths, are lit.
 pub fn visibility(
     map: &ShadowMap,
     filter: Filter,
     receiver: &Receiver,
-    fetch: impl Fn(i32, i32) -> f32,
+    texels: impl Texels,
 ) -> f32 {
     let st = receiver.st;
     // What is served lies in the map up to rounding, at the border of its part as well.
@@ -112,7 +148,7 @@ pub fn visibility(
     }
     let texel = texel_coordinates(map, st);
     let test = Test::new(map, receiver);
-    let is_lit = |i, j| f64::from(fetch(i, j)) >= test.nearest_lit(i, j);
+    let is_lit = |i, j| f64::from(texels.depth(i, j)) >= test.nearest_lit(i, j);
     match filter {
         Filter::Hard => {
             let last = |n: u32| f64::from(n - 1);
@@ -126,6 +162,10 @@ pub fn visibility(
             let rows = Span::new(texel.y, n);
             let row_sum = |j| columns.sum(|i| f64::from(u8::from(is_lit(i, j))));
             (rows.sum(row_sum) / f64::from(n * n)) as f32
+        }
+        Filter::Prefiltered(prefilter) => {
+            let channels = texels.statistics(map, &prefilter, texel);
+            prefilter.visibility(map, receiver, &channels)
         }
     }
 }

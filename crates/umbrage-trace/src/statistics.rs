@@ -1,0 +1,109 @@
+//! What filters that are applied ahead of lookup make of a map's depths.
+
+use crate::{DepthMap, Error};
+use glam::DVec2;
+use rayon::prelude::*;
+use umbrage::ShadowMap;
+use umbrage::visibility::Prefilter;
+use umbrage::visibility::statistic::{Channels, MAX_CHANNELS, Storage};
+
+/// Numbers in place of depths, blurred, and rounded as they are stored.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct StatisticMap {
+    channels: usize,
+    /// Texels with the gutter.
+    size: [usize; 2],
+    gutter: u32,
+    texels: Vec<f32>,
+}
+
+impl StatisticMap {
+    /// Encodes and blurs, first along rows, then along columns, each time rounding to what is stored. Texels beyond the gutter
+    /// count as the last ones in it.
+    pub(crate) fn new(
+        map: &ShadowMap,
+        depths: &DepthMap,
+        prefilter: &Prefilter,
+    ) -> Result<Self, Error> {
+        let channels = prefilter.statistic.channels();
+        let resolution = depths.resolution();
+        let gutter = depths.gutter();
+        if resolution.contains(&0) {
+            return Ok(Self { channels, size: [0, 0], gutter, texels: Vec::new() });
+        }
+        let size = resolution.map(|n| (n + 2 * gutter) as usize);
+        let row = size[0] * channels;
+        let storage = prefilter.statistic.storage();
+        let first = -(gutter as i32);
+        let mut texels = buffer(row, size[1], resolution)?;
+        texels.par_chunks_mut(row).enumerate().for_each(|(y, row)| {
+            let j = first + y as i32;
+            for (texel, i) in row.chunks_exact_mut(channels).zip(first..) {
+                let encoded = prefilter.encode(map, i, j, depths.texel(i, j));
+                texel.iter_mut().zip(encoded).for_each(|(t, e)| *t = storage.stored(e));
+            }
+        });
+        let weights: Vec<f32> = prefilter.weights().collect();
+        if weights.len() > 1 {
+            let mut blurred = buffer(row, size[1], resolution)?;
+            blurred.par_chunks_mut(row).zip(texels.par_chunks(row)).for_each(|(to, from)| {
+                let at = |x: usize, k: isize| {
+                    let x = x.saturating_add_signed(k).min(size[0] - 1) * channels;
+                    &from[x..x + channels]
+                };
+                for (x, to) in to.chunks_exact_mut(channels).enumerate() {
+                    blur(to, &weights, storage, |k| at(x, k));
+                }
+            });
+            texels.par_chunks_mut(row).enumerate().for_each(|(y, to)| {
+                let at = |k: isize| {
+                    let y = y.saturating_add_signed(k).min(size[1] - 1) * row;
+                    &blurred[y..y + row]
+                };
+                blur(to, &weights, storage, at);
+            });
+        }
+        Ok(Self { channels, size, gutter, texels })
+    }
+
+    /// Bilinearly between texels, in texel coordinates.
+    pub(crate) fn sample(&self, texel: DVec2) -> Channels {
+        let mut sum = [0.0; MAX_CHANNELS];
+        if self.texels.is_empty() {
+            return sum;
+        }
+        let corner = texel - 0.5 + f64::from(self.gutter);
+        let first = corner.floor();
+        let fraction = (corner - first).as_vec2();
+        let clamp = |at: f64, n: usize| (at.max(0.0) as usize).min(n - 1);
+        for (y, v) in [(0.0, 1.0 - fraction.y), (1.0, fraction.y)] {
+            for (x, u) in [(0.0, 1.0 - fraction.x), (1.0, fraction.x)] {
+                let at = clamp(first.y + y, self.size[1]) * self.size[0]
+                    + clamp(first.x + x, self.size[0]);
+                let texel = &self.texels[at * self.channels..][..self.channels];
+                sum.iter_mut().zip(texel).for_each(|(s, t)| *s += u * v * t);
+            }
+        }
+        sum
+    }
+}
+
+/// One step of a separable filter for a run of numbers: `at` gives the run that lies so many steps away.
+fn blur<'a>(to: &mut [f32], weights: &[f32], storage: Storage, at: impl Fn(isize) -> &'a [f32]) {
+    to.fill(0.0);
+    for (k, weight) in (0isize..).zip(weights) {
+        let sides = if k == 0 { &[0][..] } else { &[-k, k] };
+        for &k in sides {
+            to.iter_mut().zip(at(k)).for_each(|(t, f)| *t += weight * f);
+        }
+    }
+    to.iter_mut().for_each(|t| *t = storage.stored(*t));
+}
+
+fn buffer(row: usize, rows: usize, resolution: [u32; 2]) -> Result<Vec<f32>, Error> {
+    let mut buffer = Vec::new();
+    let count = row.checked_mul(rows).ok_or(Error::Memory { resolution })?;
+    buffer.try_reserve_exact(count).map_err(|_| Error::Memory { resolution })?;
+    buffer.resize(count, 0.0);
+    Ok(buffer)
+}

@@ -1,0 +1,419 @@
+//! The passes of filters that are applied ahead of lookup.
+
+use crate::data::PrefilterMap;
+use crate::passes::{aim, part};
+use crate::shadows::{DepthTexture, Record};
+use crate::wgsl::{self, PrefilterPass};
+use crate::{Error, Support};
+use std::mem::size_of;
+use std::num::NonZeroU64;
+use std::ops::Range;
+use umbrage::visibility::Prefilter;
+use umbrage::visibility::statistic::{Statistic, Storage};
+use umbrage::{Place, Plan};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferDescriptor, BufferUsages, ColorTargetState, CommandEncoder, Device, Extent3d,
+    FragmentState, LoadOp, Operations, PipelineCompilationOptions, PipelineLayoutDescriptor,
+    PrimitiveState, Queue, RenderPassColorAttachment, RenderPassDescriptor,
+    RenderPassTimestampWrites, RenderPipeline, RenderPipelineDescriptor, ShaderModuleDescriptor,
+    ShaderSource, ShaderStages, StoreOp, TextureDescriptor, TextureDimension, TextureFormat,
+    TextureSampleType, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+    VertexState,
+};
+
+/// Encodes and blurs the maps that were drawn.
+#[derive(Debug)]
+pub(crate) struct Prefiltering {
+    /// Textures that a map's numbers take, and which of them are drawn at a time.
+    textures: u32,
+    groups: Vec<Range<u32>>,
+    format: TextureFormat,
+    is_blurred: bool,
+    encode: Vec<RenderPipeline>,
+    rows: Vec<RenderPipeline>,
+    columns: Vec<RenderPipeline>,
+    encode_layout: BindGroupLayout,
+    blur_layout: BindGroupLayout,
+    stride: u32,
+    uniforms: Buffer,
+    bytes: Vec<u8>,
+    numbers: Numbers,
+    /// What is blurred along rows.
+    scratch: Option<Numbers>,
+    bindings: Bindings,
+}
+
+/// Numbers in layers: those of a layer of maps follow one another.
+#[derive(Debug)]
+struct Numbers {
+    all: TextureView,
+    layers: Vec<TextureView>,
+    bytes: u64,
+}
+
+/// What passes read.
+#[derive(Debug)]
+struct Bindings {
+    /// Depths, one a layer of maps.
+    depths: Vec<BindGroup>,
+    numbers: BindGroup,
+    scratch: Option<BindGroup>,
+}
+
+/// How a statistic's numbers are stored on a GPU.
+fn format(statistic: &Statistic) -> TextureFormat {
+    match (statistic.storage(), statistic.channels()) {
+        (Storage::Float32, 1) => TextureFormat::R32Float,
+        (Storage::Float32, 2) => TextureFormat::Rg32Float,
+        (Storage::Float32, _) => TextureFormat::Rgba32Float,
+        (Storage::Unorm16, _) => TextureFormat::Rgba16Unorm,
+        (Storage::Snorm16, _) => TextureFormat::Rgba16Snorm,
+        (Storage::Snorm8, _) => TextureFormat::Rgba8Snorm,
+    }
+}
+
+/// That the device can store and interpolate a statistic's numbers.
+fn check(statistic: &Statistic, support: &Support) -> Result<(), Error> {
+    let lacks = |what| {
+        let why = "in which this filter stores its numbers: take another filter, such as pcf";
+        Err(Error::Unsupported { what, why })
+    };
+    match statistic.storage() {
+        Storage::Float32 if !support.float32 => lacks("filtering of 32-bit floats"),
+        Storage::Unorm16 | Storage::Snorm16 if !support.norm16 => {
+            lacks("normalised 16-bit textures")
+        }
+        Storage::Snorm8 if !support.snorm8 => lacks("drawing into signed 8-bit textures"),
+        _ if !support.depth_fetch => lacks("fetching of depths"),
+        _ => Ok(()),
+    }
+}
+
+impl Prefiltering {
+    pub(crate) fn new(
+        device: &Device,
+        support: &Support,
+        prefilter: &Prefilter,
+        depths: &DepthTexture,
+    ) -> Result<Self, Error> {
+        prefilter
+            .check()
+            .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
+        let statistic = &prefilter.statistic;
+        check(statistic, support)?;
+        let format = format(statistic);
+        let textures = wgsl::textures(statistic);
+        let cost = format.target_pixel_byte_cost().unwrap_or(16);
+        let at_a_time = (support.max_attachment_bytes / cost).clamp(1, support.max_attachments);
+        let groups: Vec<Range<u32>> = (0..textures)
+            .step_by(at_a_time as usize)
+            .map(|first| first..textures.min(first + at_a_time))
+            .collect();
+        let encode_layout = layout(device, PrefilterPass::Encode);
+        let blur_layout = layout(device, PrefilterPass::Rows);
+        let pipelines = |pass| -> Vec<RenderPipeline> {
+            let layout = if pass == PrefilterPass::Encode { &encode_layout } else { &blur_layout };
+            let one = |range: &Range<u32>| {
+                pipeline(
+                    device,
+                    layout,
+                    format,
+                    &wgsl::prefilter(prefilter, pass, range.clone()),
+                    range,
+                )
+            };
+            groups.iter().map(one).collect()
+        };
+        let is_blurred = prefilter.blur_texels > 1;
+        let blur = |pass| if is_blurred { pipelines(pass) } else { Vec::new() };
+        let stride = (size_of::<PrefilterMap>() as u32).next_multiple_of(support.uniform_alignment);
+        let uniforms = uniforms(device, stride);
+        let numbers = Numbers::new(device, support, format, depths, textures);
+        let scratch = is_blurred.then(|| Numbers::new(device, support, format, depths, textures));
+        let bindings = Bindings::new(
+            device,
+            [&encode_layout, &blur_layout],
+            &uniforms,
+            depths,
+            &numbers,
+            scratch.as_ref(),
+        );
+        Ok(Self {
+            textures,
+            format,
+            is_blurred,
+            encode: pipelines(PrefilterPass::Encode),
+            rows: blur(PrefilterPass::Rows),
+            columns: blur(PrefilterPass::Columns),
+            groups,
+            encode_layout,
+            blur_layout,
+            stride,
+            uniforms,
+            bytes: Vec::new(),
+            numbers,
+            scratch,
+            bindings,
+        })
+    }
+
+    /// What lookup samples.
+    pub(crate) fn view(&self) -> &TextureView {
+        &self.numbers.all
+    }
+
+    /// Memory of the numbers, without what is only needed to blur them.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.numbers.bytes
+    }
+
+    /// Makes room for the maps of another depth texture.
+    pub(crate) fn resize(&mut self, device: &Device, support: &Support, depths: &DepthTexture) {
+        self.numbers = Numbers::new(device, support, self.format, depths, self.textures);
+        self.scratch = self
+            .is_blurred
+            .then(|| Numbers::new(device, support, self.format, depths, self.textures));
+        self.rebind(device, depths);
+    }
+
+    fn rebind(&mut self, device: &Device, depths: &DepthTexture) {
+        let layouts = [&self.encode_layout, &self.blur_layout];
+        self.bindings = Bindings::new(
+            device,
+            layouts,
+            &self.uniforms,
+            depths,
+            &self.numbers,
+            self.scratch.as_ref(),
+        );
+    }
+
+    /// Tells the passes where maps lie.
+    pub(crate) fn upload(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        plan: &Plan,
+        records: &[Record],
+        gutter: u32,
+        depths: &DepthTexture,
+    ) {
+        let stride = self.stride as usize;
+        self.bytes.clear();
+        self.bytes.resize(stride * records.len(), 0);
+        let maps = plan.maps.iter().zip(records).zip(self.bytes.chunks_exact_mut(stride));
+        for ((map, record), bytes) in maps {
+            if let Some(place) = record.place {
+                let uniform = PrefilterMap::new(map, &place, gutter, self.textures);
+                bytes[..size_of::<PrefilterMap>()].copy_from_slice(bytemuck::bytes_of(&uniform));
+            }
+        }
+        if self.uniforms.size() < self.bytes.len() as u64 {
+            self.uniforms =
+                uniforms(device, self.stride * records.len().next_power_of_two() as u32);
+            self.rebind(device, depths);
+        }
+        queue.write_buffer(&self.uniforms, 0, &self.bytes);
+    }
+
+    /// Encodes and blurs the stale maps of a layer. Timestamps are those of the whole, where this layer is the first or last.
+    pub(crate) fn encode(
+        &self,
+        encoder: &mut CommandEncoder,
+        layer: usize,
+        stale: impl Iterator<Item = (usize, Place)> + Clone,
+        gutter: u32,
+        timestamps: Option<&RenderPassTimestampWrites<'_>>,
+    ) {
+        let numbers = &self.numbers.layers;
+        let mut steps = vec![(&self.encode, &self.bindings.depths[layer], numbers)];
+        if let (Some(scratch), Some(blurred)) = (&self.scratch, &self.bindings.scratch) {
+            steps.push((&self.rows, &self.bindings.numbers, &scratch.layers));
+            steps.push((&self.columns, blurred, numbers));
+        }
+        let passes = steps.len() * self.groups.len();
+        let mut index = 0;
+        for (pipelines, bindings, target) in steps {
+            for (pipeline, range) in pipelines.iter().zip(&self.groups) {
+                let first = layer * self.textures as usize;
+                let attachments: Vec<_> =
+                    range.clone().map(|i| attachment(&target[first + i as usize])).collect();
+                let writes = part(timestamps, index == 0, index + 1 == passes);
+                index += 1;
+                let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                    label: Some("shadow prefilter"),
+                    color_attachments: &attachments,
+                    depth_stencil_attachment: None,
+                    timestamp_writes: writes,
+                    occlusion_query_set: None,
+                    multiview_mask: None,
+                });
+                pass.set_pipeline(pipeline);
+                for (map, place) in stale.clone() {
+                    aim(&mut pass, &place, gutter);
+                    pass.set_bind_group(0, bindings, &[map as u32 * self.stride]);
+                    pass.draw(0..3, 0..1);
+                }
+            }
+        }
+    }
+}
+
+fn attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+    Some(RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        // Other maps' numbers stay.
+        ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
+    })
+}
+
+impl Numbers {
+    fn new(
+        device: &Device,
+        support: &Support,
+        format: TextureFormat,
+        depths: &DepthTexture,
+        textures: u32,
+    ) -> Self {
+        let [width, height] = depths.size();
+        let layers = support.array_layers(textures * depths.layers.len() as u32);
+        let texture = device.create_texture(&TextureDescriptor {
+            label: Some("shadow numbers"),
+            size: Extent3d { width, height, depth_or_array_layers: layers },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let view = |dimension, layer, count| {
+            texture.create_view(&TextureViewDescriptor {
+                dimension: Some(dimension),
+                base_array_layer: layer,
+                array_layer_count: count,
+                ..TextureViewDescriptor::default()
+            })
+        };
+        let texel = format.block_copy_size(None).unwrap_or(0);
+        Self {
+            all: view(TextureViewDimension::D2Array, 0, None),
+            layers: (0..layers).map(|i| view(TextureViewDimension::D2, i, Some(1))).collect(),
+            bytes: u64::from(width) * u64::from(height) * u64::from(layers) * u64::from(texel),
+        }
+    }
+}
+
+impl Bindings {
+    fn new(
+        device: &Device,
+        [encode, blur]: [&BindGroupLayout; 2],
+        uniforms: &Buffer,
+        depths: &DepthTexture,
+        numbers: &Numbers,
+        scratch: Option<&Numbers>,
+    ) -> Self {
+        let bind = |layout, view| {
+            device.create_bind_group(&BindGroupDescriptor {
+                label: Some("shadow prefilter"),
+                layout,
+                entries: &[
+                    BindGroupEntry {
+                        binding: 0,
+                        resource: BindingResource::Buffer(wgpu::BufferBinding {
+                            buffer: uniforms,
+                            offset: 0,
+                            size: NonZeroU64::new(size_of::<PrefilterMap>() as u64),
+                        }),
+                    },
+                    BindGroupEntry { binding: 1, resource: BindingResource::TextureView(view) },
+                ],
+            })
+        };
+        Self {
+            depths: depths.layers.iter().map(|view| bind(encode, view)).collect(),
+            numbers: bind(blur, &numbers.all),
+            scratch: scratch.map(|s| bind(blur, &s.all)),
+        }
+    }
+}
+
+fn uniforms(device: &Device, size: u32) -> Buffer {
+    device.create_buffer(&BufferDescriptor {
+        label: Some("shadow prefilter"),
+        size: u64::from(size),
+        usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+fn layout(device: &Device, pass: PrefilterPass) -> BindGroupLayout {
+    let (sample_type, view_dimension) = match pass {
+        PrefilterPass::Encode => (TextureSampleType::Depth, TextureViewDimension::D2),
+        _ => (TextureSampleType::Float { filterable: false }, TextureViewDimension::D2Array),
+    };
+    let entry = |binding, ty| BindGroupLayoutEntry {
+        binding,
+        visibility: ShaderStages::FRAGMENT,
+        ty,
+        count: None,
+    };
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+        label: Some("shadow prefilter"),
+        entries: &[
+            entry(
+                0,
+                BindingType::Buffer {
+                    ty: BufferBindingType::Uniform,
+                    has_dynamic_offset: true,
+                    min_binding_size: NonZeroU64::new(size_of::<PrefilterMap>() as u64),
+                },
+            ),
+            entry(1, BindingType::Texture { sample_type, view_dimension, multisampled: false }),
+        ],
+    })
+}
+
+fn pipeline(
+    device: &Device,
+    layout: &BindGroupLayout,
+    format: TextureFormat,
+    text: &str,
+    range: &Range<u32>,
+) -> RenderPipeline {
+    let module = device.create_shader_module(ShaderModuleDescriptor {
+        label: Some("shadow prefilter"),
+        source: ShaderSource::Wgsl(text.into()),
+    });
+    let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some("shadow prefilter"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    let targets = vec![Some(ColorTargetState::from(format)); range.len()];
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: Some("shadow prefilter"),
+        layout: Some(&layout),
+        vertex: VertexState {
+            module: &module,
+            entry_point: None,
+            compilation_options: PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(FragmentState {
+            module: &module,
+            entry_point: None,
+            compilation_options: PipelineCompilationOptions::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

@@ -1,0 +1,55 @@
+// Numbers in place of depths, and their blur, map by map.
+
+struct ShadowPrefilterMap {
+    beam_scale: vec4f,
+    // Where the map begins in the texture, and what may be read: the map with its gutter.
+    origin: vec2f,
+    low: vec2i,
+    high: vec2i,
+    // First layer of the numbers.
+    first_layer: u32,
+}
+
+@group(0) @binding(0) var<uniform> shadow_prefilter_map: ShadowPrefilterMap;
+//IF ENCODE
+@group(0) @binding(1) var shadow_prefilter_depths: texture_depth_2d;
+//ELSE
+@group(0) @binding(1) var shadow_prefilter_source: texture_2d_array<f32>;
+//END
+
+struct ShadowPrefiltered {
+{OUTPUTS}
+}
+
+@vertex
+fn shadow_prefilter_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    let corner = vec2f(f32((index << 1u) & 2u), f32(index & 2u));
+    return vec4f(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+//IF ENCODE
+@fragment
+fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered {
+    let depth = textureLoad(shadow_prefilter_depths, vec2i(at.xy), 0);
+    let texel = at.xy - shadow_prefilter_map.origin;
+    let linear = shadow_linear_depth(shadow_prefilter_map.beam_scale, texel, depth);
+    let numbers = shadow_encode(clamp(linear, 0.0, 1.0));
+    return ShadowPrefiltered({VALUES});
+}
+//ELSE
+fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
+    let low = shadow_prefilter_map.low;
+    let high = shadow_prefilter_map.high;
+    let direction = vec2i({DIRECTION});
+    var sum = {WEIGHT_0} * textureLoad(shadow_prefilter_source, at, layer, 0);
+{TAPS}
+    return sum;
+}
+
+@fragment
+fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered {
+    let texel = vec2i(at.xy);
+    let layer = shadow_prefilter_map.first_layer;
+    return ShadowPrefiltered({VALUES});
+}
+//END

@@ -1,0 +1,48 @@
+use super::{Channels, Encoding};
+use crate::error::{Error, check};
+use std::fmt;
+
+/// Exponential shadow maps (Annen, Mertens, Seidel, Flerackers and Kautz 2008): exp(c (z − d)) in place of the step, right where z < d, clamped to 1 where
+/// the mean of several depths lies behind the receiver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Esm {
+    /// c, above 0 and at most [`MAX_EXPONENT`](Self::MAX_EXPONENT): how steep the step is.
+    pub exponent: f32,
+}
+
+impl Esm {
+    /// The largest c: exp(−c) must be a number of single precision.
+    pub const MAX_EXPONENT: f32 = 80.0;
+}
+
+impl Default for Esm {
+    fn default() -> Self {
+        Self { exponent: Self::MAX_EXPONENT }
+    }
+}
+
+impl Encoding for Esm {
+    fn channels(&self) -> usize {
+        1
+    }
+
+    fn encode(&self, depth: f32, channels: &mut Channels) {
+        channels[0] = (self.exponent * (depth - 1.0)).exp();
+    }
+
+    fn visibility(&self, channels: &Channels, depth: f32) -> f32 {
+        channels[0] * (self.exponent * (1.0 - depth)).exp()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        check(self.exponent > 0.0 && self.exponent <= Self::MAX_EXPONENT, "filter.exponent", || {
+            format!("must be above 0 and at most {}, is {}", Self::MAX_EXPONENT, self.exponent)
+        })
+    }
+}
+
+impl fmt::Display for Esm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("esm")
+    }
+}
