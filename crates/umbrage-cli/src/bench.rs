@@ -37,7 +37,7 @@ struct ResultJson {
     gpu_timestamps: bool,
     maps: usize,
     texels: u64,
-    /// Of the maps' texture.
+    /// Of what lookup reads.
     bytes: u64,
     storage_factor: f64,
     /// What a frame draws into each map, if all are drawn.
@@ -189,7 +189,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             gpu_timestamps: contender.bencher.has_timestamps(),
             maps: plan.maps.len(),
             texels: plan.texels(),
-            bytes: contender.bencher.bytes(plan),
+            bytes: first.costs.bytes,
             storage_factor: plan.storage_factor(),
             map_draws,
             ms: TimesJson {

@@ -47,10 +47,11 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 
 fn table(report: &Report) -> String {
     type Column = (&'static str, fn(&Measured) -> String);
-    const COLUMNS: [Column; 15] = [
+    const COLUMNS: [Column; 16] = [
         ("shadows", |r| r.shadows.clone()),
         ("maps", |r| r.maps.to_string()),
         ("texels", |r| r.texels.to_string()),
+        ("KiB", |r| r.bytes.map_or("-".into(), |b| b.div_ceil(1024).to_string())),
         ("wrong", |r| percent(r.metrics.wrong_fraction)),
         ("false light", |r| percent(r.metrics.false_light)),
         ("mean error", |r| number(r.metrics.mean_abs_error, 4)),

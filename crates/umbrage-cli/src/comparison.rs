@@ -293,6 +293,7 @@ impl Contender<'_> {
             device: device.filter(|_| self.executor.is_gpu()),
             maps: self.plan.maps.len() as u32,
             texels: self.plan.texels(),
+            bytes: Some(self.executor.bytes()),
             metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
             error_px: measure_error_px(&error_px, truth.counted)?,
             storage_factor: Some(self.plan.storage_factor()),

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use rayon::prelude::*;
 use std::time::Instant;
 use umbrage::visibility::Filter;
-use umbrage::{Plan, ShadowMap, Warp};
+use umbrage::{Plan, Warp};
 use umbrage_render::{Drawn, FrameTarget, Gpu, Look, Renderer, SceneBuffers, Timer};
 use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer, View};
@@ -160,6 +160,14 @@ impl<'a> Executor<'a> {
         Ok(())
     }
 
+    /// Memory of what lookup reads of the maps that are rendered.
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Gpu(on) => on.renderer.shadows().lookup_bytes(),
+            Self::Reference { maps, .. } => maps.as_ref().map_or(0, |(_, r)| r.bytes()),
+        }
+    }
+
     /// What rows of a picture look like. The maps must be rendered.
     pub(crate) fn strip(&mut self, rows: &Rows<'_>) -> Result<Strip> {
         match self {
@@ -206,6 +214,8 @@ impl<'a> Executor<'a> {
 
 /// What a frame cost, milliseconds.
 pub(crate) struct Costs {
+    /// Memory of what lookup reads.
+    pub(crate) bytes: u64,
     pub(crate) depth: f64,
     /// Where it is told apart from `depth`, and there is any.
     pub(crate) filter: Option<f64>,
@@ -246,18 +256,6 @@ impl Bencher<'_> {
         matches!(self.target, Some((_, Some(_))))
     }
 
-    /// Memory of a plan's maps, once they are drawn.
-    pub(crate) fn bytes(&self, plan: &Plan) -> u64 {
-        match &self.executor {
-            Executor::Gpu(on) => on.renderer.shadows().lookup_bytes(),
-            Executor::Reference { filter, .. } => {
-                let side = |n: u32| u64::from(n + 2 * filter.reach_texels());
-                let texels = |m: &ShadowMap| side(m.resolution[0]) * side(m.resolution[1]);
-                4 * plan.maps.iter().filter(|m| !m.is_empty()).map(texels).sum::<u64>()
-            }
-        }
-    }
-
     /// Draws a frame, and waits until it is done. `still`: maps that are as they were are not drawn again.
     pub(crate) fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs> {
         let start = Instant::now();
@@ -286,7 +284,8 @@ impl Bencher<'_> {
                 let is_prefiltered =
                     matches!(renderer.shadows().options().filter, Filter::Prefiltered(_));
                 let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
-                Ok(Costs { depth, filter, shade, drawn: Some(drawn) })
+                let bytes = renderer.shadows().lookup_bytes();
+                Ok(Costs { bytes, depth, filter, shade, drawn: Some(drawn) })
             }
             (Executor::Reference { tracer, filter, .. }, _) => {
                 let reference = Reference::render(tracer, plan, *filter, &|_| {})?;
@@ -295,7 +294,8 @@ impl Bencher<'_> {
                 for range in view.bands() {
                     Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
                 }
-                Ok(Costs { depth, filter: None, shade: milliseconds(shading), drawn: None })
+                let bytes = reference.bytes();
+                Ok(Costs { bytes, depth, filter: None, shade: milliseconds(shading), drawn: None })
             }
             (Executor::Gpu(_), None) => bail!("a GPU draws into a target"),
         }

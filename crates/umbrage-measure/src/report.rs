@@ -114,6 +114,9 @@ pub struct Measured {
     pub maps: u32,
     /// Texels of all maps together.
     pub texels: u64,
+    /// Memory of what lookup reads, bytes: depths, or the numbers that a filter stores in their place, gutters and smaller copies included.
+    #[serde(default)]
+    pub bytes: Option<u64>,
     /// Distance from the truth; its fields stand beside these in the JSON.
     #[serde(flatten)]
     pub metrics: Metrics,
@@ -184,6 +187,7 @@ pub(crate) mod tests {
             device: None,
             maps: 1,
             texels: 1 << 40,
+            bytes: Some(1 << 42),
             metrics: Metrics {
                 counted: if wrong.is_some() { 1000 } else { 0 },
                 wrong_fraction: wrong,
@@ -235,7 +239,7 @@ pub(crate) mod tests {
         assert_eq!(json["truth"], json!({"rays_per_pixel": 16, "seconds": 1.25}));
         assert_eq!(json["view"]["fov"], 60.0);
         let expected = json!({
-            "shadows": "lambda=0@1024", "backend": "reference", "maps": 1, "texels": 1_u64 << 40,
+            "shadows": "lambda=0@1024", "backend": "reference", "maps": 1, "texels": 1_u64 << 40, "bytes": 1_u64 << 42,
             "counted_pixels": 1000, "wrong_fraction": 0.25, "false_light": 0.25, "false_shadow": 0.0,
             "mean_abs_error": 0.25, "flip": 0.25,
             "error_px": {"p50": 0.1 + 0.2, "p95": 2.0, "max": 3.5, "undefined": 7},

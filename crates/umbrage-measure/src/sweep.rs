@@ -200,7 +200,7 @@ impl Sweep {
 
 /// The columns of `results.csv` behind the view's own.
 type CsvColumn = (&'static str, fn(&Measured) -> String);
-const CSV: [CsvColumn; 17] = [
+const CSV: [CsvColumn; 18] = [
     ("shadows", |r| r.shadows.clone()),
     ("backend", |r| r.backend.clone()),
     ("maps", |r| r.maps.to_string()),
@@ -217,6 +217,7 @@ const CSV: [CsvColumn; 17] = [
     ("error_px_undefined", |r| r.error_px.undefined.to_string()),
     ("storage_factor", |r| number(r.storage_factor)),
     ("casters_culled", |r| number(r.casters_culled)),
+    ("bytes", |r| r.bytes.map(|b| b.to_string()).unwrap_or_default()),
     ("error", |_| String::new()),
 ];
 
@@ -262,6 +263,7 @@ struct ResultJson<'a> {
     device: Option<&'a str>,
     maps: u32,
     texels: u64,
+    bytes: Option<u64>,
     #[serde(flatten)]
     metrics: &'a Metrics,
     error_px: &'a ErrorPx,
@@ -278,6 +280,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             device,
             maps,
             texels,
+            bytes,
             metrics,
             error_px,
             storage_factor,
@@ -291,6 +294,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             device: device.as_deref(),
             maps: *maps,
             texels: *texels,
+            bytes: *bytes,
             metrics,
             error_px,
             storage_factor: *storage_factor,

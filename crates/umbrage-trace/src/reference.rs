@@ -11,6 +11,8 @@ use umbrage::{Plan, ShadowMap};
 pub struct DepthMap {
     resolution: [u32; 2],
     gutter: u32,
+    /// Texels with the gutter, and whatever is drawn behind its end.
+    drawn: [u32; 2],
     texels: Vec<f32>,
 }
 
@@ -30,11 +32,24 @@ impl DepthMap {
         gutter: u32,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
+        let drawn = map.resolution.map(|n| n.saturating_add(2 * gutter));
+        Self::render_drawn(tracer, map, gutter, drawn, progress)
+    }
+
+    /// As [`render`](Self::render), so many texels in all.
+    fn render_drawn(
+        tracer: &Tracer<'_>,
+        map: &ShadowMap,
+        gutter: u32,
+        drawn: [u32; 2],
+        progress: Progress<'_>,
+    ) -> Result<Self, Error> {
         let resolution = map.resolution;
         if map.is_empty() {
-            return Ok(Self { resolution: [0, 0], gutter: 0, texels: Vec::new() });
+            let texels = Vec::new();
+            return Ok(Self { resolution: [0, 0], gutter: 0, drawn: [0, 0], texels });
         }
-        let [width, height] = resolution.map(|n| n as usize + 2 * gutter as usize);
+        let [width, height] = drawn.map(|n| n as usize);
         let mut texels = Vec::new();
         let count = width.checked_mul(height).ok_or(Error::Memory { resolution })?;
         texels.try_reserve_exact(count).map_err(|_| Error::Memory { resolution })?;
@@ -46,7 +61,7 @@ impl DepthMap {
             }
             progress(1);
         });
-        Ok(Self { resolution, gutter, texels })
+        Ok(Self { resolution, gutter, drawn, texels })
     }
 
     /// Rows that [`render`](Self::render) will report.
@@ -59,14 +74,9 @@ impl DepthMap {
         self.resolution
     }
 
-    /// Texels, the gutter's included.
-    fn texels_stored(&self) -> u64 {
-        self.texels.len() as u64
-    }
-
-    /// Width of the gutter, texels.
-    pub(crate) fn gutter(&self) -> u32 {
-        self.gutter
+    /// Width of the gutter, and all that is drawn, texels.
+    pub(crate) fn drawn(&self) -> (u32, [u32; 2]) {
+        (self.gutter, self.drawn)
     }
 
     /// Depth of texel (`i`, `j`); the nearest one that there is for indices beyond the gutter, 1 in a
@@ -76,11 +86,10 @@ impl DepthMap {
             return 1.0;
         }
         let gutter = i64::from(self.gutter);
-        let clamp = |index: i32, n: u32| {
-            (i64::from(index) + gutter).clamp(0, i64::from(n) + 2 * gutter - 1) as usize
-        };
-        let width = (self.resolution[0] + 2 * self.gutter) as usize;
-        self.texels[clamp(j, self.resolution[1]) * width + clamp(i, self.resolution[0])]
+        let clamp =
+            |index: i32, n: u32| (i64::from(index) + gutter).clamp(0, i64::from(n) - 1) as usize;
+        let [width, height] = self.drawn;
+        self.texels[clamp(j, height) * width as usize + clamp(i, width)]
     }
 }
 
@@ -126,10 +135,16 @@ impl Texels for Filtered<'_> {
         self.depths.texel(i, j)
     }
 
-    fn statistics(&self, map: &ShadowMap, prefilter: &Prefilter, texel: DVec2) -> Channels {
+    fn statistics(
+        &self,
+        map: &ShadowMap,
+        prefilter: &Prefilter,
+        texel: DVec2,
+        lod: f64,
+    ) -> Channels {
         match self.statistics {
-            Some(statistics) => statistics.sample(texel),
-            None => (|i, j| self.depths.texel(i, j)).statistics(map, prefilter, texel),
+            Some(statistics) => statistics.sample(texel, lod),
+            None => (|i, j| self.depths.texel(i, j)).statistics(map, prefilter, texel, lod),
         }
     }
 }
@@ -155,7 +170,10 @@ impl<'a> Reference<'a> {
         filter: Filter,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
-        let render = |map| DepthMap::render(tracer, map, filter.reach_texels(), progress);
+        let render = |map: &ShadowMap| {
+            let drawn = filter.drawn_texels(map.resolution);
+            DepthMap::render_drawn(tracer, map, filter.reach_texels(), drawn, progress)
+        };
         let maps = plan.maps.iter().map(render).collect::<Result<Vec<_>, _>>()?;
         let statistics = match &filter {
             Filter::Prefiltered(prefilter) => {
@@ -171,13 +189,21 @@ impl<'a> Reference<'a> {
 
     /// Rows of texels that [`render`](Self::render) will report.
     pub fn rows(plan: &Plan, filter: Filter) -> u64 {
-        plan.maps.iter().map(|m| DepthMap::rows(m, filter.reach_texels())).sum()
+        let full = plan.maps.iter().filter(|m| !m.is_empty());
+        full.map(|m| u64::from(filter.drawn_texels(m.resolution)[1])).sum()
     }
 
     /// Memory of all that is looked up, bytes: what a texel takes on a GPU, gutters included.
     pub fn bytes(&self) -> u64 {
-        let texels = self.maps.iter().map(DepthMap::texels_stored).sum::<u64>();
-        texels * u64::from(bytes_per_texel(self.filter))
+        let stored = |m: &DepthMap| m.texels.len() as u64;
+        let texels =
+            self.maps.iter().map(stored).sum::<u64>() * u64::from(bytes_per_texel(self.filter));
+        // A quarter, a sixteenth … of smaller and smaller copies.
+        let levels = match self.filter {
+            Filter::Prefiltered(prefilter) => prefilter.levels(),
+            _ => 1,
+        };
+        (0..levels).map(|level| texels >> (2 * level)).sum()
     }
 
     /// The maps' depths, in the plan's order.

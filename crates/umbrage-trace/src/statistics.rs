@@ -7,19 +7,25 @@ use umbrage::ShadowMap;
 use umbrage::visibility::Prefilter;
 use umbrage::visibility::statistic::{Channels, MAX_CHANNELS, Storage};
 
-/// Numbers in place of depths, blurred, and rounded as they are stored.
+/// Numbers in place of depths, filtered, and rounded as they are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct StatisticMap {
     channels: usize,
-    /// Texels with the gutter.
-    size: [usize; 2],
     gutter: u32,
+    /// Each of half the resolution of the one before.
+    levels: Vec<Level>,
+}
+
+/// A copy of a map.
+#[derive(Clone, Debug, PartialEq)]
+struct Level {
+    size: [usize; 2],
     texels: Vec<f32>,
 }
 
 impl StatisticMap {
-    /// Encodes and blurs, first along rows, then along columns, each time rounding to what is stored. Texels beyond the gutter
-    /// count as the last ones in it.
+    /// Encodes and blurs, first along rows, then along columns, or makes smaller and smaller copies, each time rounding to what is stored.
+    /// Texels beyond what is drawn count as its last ones.
     pub(crate) fn new(
         map: &ShadowMap,
         depths: &DepthMap,
@@ -27,11 +33,11 @@ impl StatisticMap {
     ) -> Result<Self, Error> {
         let channels = prefilter.statistic.channels();
         let resolution = depths.resolution();
-        let gutter = depths.gutter();
+        let (gutter, drawn) = depths.drawn();
         if resolution.contains(&0) {
-            return Ok(Self { channels, size: [0, 0], gutter, texels: Vec::new() });
+            return Ok(Self { channels, gutter, levels: Vec::new() });
         }
-        let size = resolution.map(|n| (n + 2 * gutter) as usize);
+        let size = drawn.map(|n| n as usize);
         let row = size[0] * channels;
         let storage = prefilter.statistic.storage();
         let first = -(gutter as i32);
@@ -63,16 +69,59 @@ impl StatisticMap {
                 blur(to, &weights, storage, at);
             });
         }
-        Ok(Self { channels, size, gutter, texels })
+        let mut levels = vec![Level { size, texels }];
+        for _ in 1..prefilter.levels() {
+            let next = levels[levels.len() - 1].halved(channels, storage, resolution)?;
+            levels.push(next);
+        }
+        Ok(Self { channels, gutter, levels })
     }
 
-    /// Bilinearly between texels, in texel coordinates.
-    pub(crate) fn sample(&self, texel: DVec2) -> Channels {
-        let mut sum = [0.0; MAX_CHANNELS];
-        if self.texels.is_empty() {
-            return sum;
+    /// Between levels linearly, between texels bilinearly, in texel coordinates.
+    pub(crate) fn sample(&self, texel: DVec2, lod: f64) -> Channels {
+        let lower = lod.floor();
+        let at = |level: f64| {
+            let place = (texel + f64::from(self.gutter)) / level.exp2();
+            let level = self.levels.get(level as usize).or(self.levels.last());
+            level.map_or([0.0; MAX_CHANNELS], |l| l.sample(place, self.channels))
+        };
+        let mut sum = at(lower);
+        let fraction = (lod - lower) as f32;
+        if fraction > 0.0 {
+            let upper = at(lower + 1.0);
+            sum.iter_mut().zip(upper).for_each(|(s, u)| *s += fraction * (u - *s));
         }
-        let corner = texel - 0.5 + f64::from(self.gutter);
+        sum
+    }
+}
+
+impl Level {
+    /// Half as wide and high, both of which are even.
+    fn halved(
+        &self,
+        channels: usize,
+        storage: Storage,
+        resolution: [u32; 2],
+    ) -> Result<Self, Error> {
+        let size = self.size.map(|n| n / 2);
+        let row = size[0] * channels;
+        let mut texels = buffer(row, size[1], resolution)?;
+        texels.par_chunks_mut(row).enumerate().for_each(|(y, to)| {
+            for (i, to) in to.iter_mut().enumerate() {
+                let [x, c] = [i / channels, i % channels];
+                let at = |dx: usize, dy: usize| {
+                    self.texels[((2 * y + dy) * self.size[0] + 2 * x + dx) * channels + c]
+                };
+                *to = storage.stored(0.25 * (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)));
+            }
+        });
+        Ok(Self { size, texels })
+    }
+
+    /// Bilinearly between texels, from the level's own corner.
+    fn sample(&self, place: DVec2, channels: usize) -> Channels {
+        let mut sum = [0.0; MAX_CHANNELS];
+        let corner = place - 0.5;
         let first = corner.floor();
         let fraction = (corner - first).as_vec2();
         let clamp = |at: f64, n: usize| (at.max(0.0) as usize).min(n - 1);
@@ -80,7 +129,7 @@ impl StatisticMap {
             for (x, u) in [(0.0, 1.0 - fraction.x), (1.0, fraction.x)] {
                 let at = clamp(first.y + y, self.size[1]) * self.size[0]
                     + clamp(first.x + x, self.size[0]);
-                let texel = &self.texels[at * self.channels..][..self.channels];
+                let texel = &self.texels[at * channels..][..channels];
                 sum.iter_mut().zip(texel).for_each(|(s, t)| *s += u * v * t);
             }
         }

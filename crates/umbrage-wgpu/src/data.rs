@@ -4,6 +4,7 @@ use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
 use crate::{Bias, Error, Support};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Mat4, Vec4};
+use umbrage::visibility::Filter;
 use umbrage::{Place, Plan, ShadowMap};
 
 /// `ShadowSettings`.
@@ -15,6 +16,8 @@ pub(crate) struct Settings {
     pub(crate) light_count: u32,
     pub(crate) padding: u32,
     pub(crate) texture_scale: [f32; 2],
+    pub(crate) padding_too: [f32; 2],
+    pub(crate) pixel_gradient: Vec4,
 }
 
 /// `ShadowLight`.
@@ -100,6 +103,12 @@ impl Lookup {
             light_count: lights.len() as u32,
             padding: 0,
             texture_scale: placed.texture_size.map(|n| 1.0 / n.max(1) as f32),
+            padding_too: [0.0; 2],
+            pixel_gradient: plan.maps.first().map_or(Vec4::ZERO, |map| {
+                let offset = local_from_render(map, placed.render_origin).w_axis.truncate();
+                let gradient = map.pixel_gradient;
+                gradient.extend(gradient.dot(offset)).as_vec4()
+            }),
         };
     }
 
@@ -167,9 +176,10 @@ pub(crate) struct PrefilterMap {
 
 impl PrefilterMap {
     /// A map whose numbers take `textures` layers.
-    pub(crate) fn new(map: &ShadowMap, place: &Place, gutter: u32, textures: u32) -> Self {
-        let low = place.origin.map(|n| n as i32 - gutter as i32);
-        let high = [0, 1].map(|i| low[i] + (place.size[i] + 2 * gutter) as i32 - 1);
+    pub(crate) fn new(map: &ShadowMap, place: &Place, filter: &Filter, textures: u32) -> Self {
+        let low = place.origin.map(|n| n as i32 - filter.reach_texels() as i32);
+        let drawn = filter.drawn_texels(place.size);
+        let high = [0, 1].map(|i| low[i] + drawn[i] as i32 - 1);
         Self {
             beam_scale: beam_scale(map),
             origin: place.origin.map(|n| n as f32),
@@ -193,15 +203,17 @@ pub(crate) fn local_from_render(map: &ShadowMap, render_origin: DVec3) -> DMat4 
     DMat4::from_translation(render_origin - map.origin)
 }
 
-/// From render space to the clip space of a viewport that covers a map and the `gutter` around it.
-pub(crate) fn clip_from_render(map: &ShadowMap, gutter: u32, render_origin: DVec3) -> DMat4 {
+/// From render space to the clip space of a viewport that covers all that is drawn for a map.
+pub(crate) fn clip_from_render(map: &ShadowMap, filter: &Filter, render_origin: DVec3) -> DMat4 {
     let m = map.shadow_from_local * local_from_render(map, render_origin);
     let w = m.row(3);
-    let across = |row: DVec4, n: u32| {
-        let [map, gutter] = [n, gutter].map(f64::from);
-        (row * map + w * gutter) * (2.0 / (map + 2.0 * gutter)) - w
+    let gutter = f64::from(filter.reach_texels());
+    let drawn = filter.drawn_texels(map.resolution);
+    let across = |i: usize| {
+        let [map, drawn] = [map.resolution[i], drawn[i]].map(f64::from);
+        (m.row(i) * map + w * gutter) * (2.0 / drawn) - w
     };
     // The first row of texels is the uppermost one of a viewport, where clip space has y = 1.
-    let [x, y] = [across(m.row(0), map.resolution[0]), -across(m.row(1), map.resolution[1])];
+    let [x, y] = [across(0), -across(1)];
     DMat4::from_cols(x, y, m.row(2), w).transpose()
 }

@@ -2,6 +2,7 @@
 
 use crate::shadows::{Record, Shadows, depth_state};
 use glam::{DVec3, Mat4};
+use umbrage::visibility::Filter;
 use umbrage::{Place, Plan, ShadowMap};
 use wgpu::{
     CommandEncoder, CompareFunction, Device, LoadOp, Operations, PipelineCompilationOptions,
@@ -79,7 +80,7 @@ impl Prepared<'_> {
         mut draw: impl FnMut(&mut MapPass<'_, '_>),
     ) -> usize {
         let Self { shadows, plan, render_origin } = self;
-        let gutter = shadows.options().filter.reach_texels();
+        let filter = shadows.options().filter;
         let Shadows { records, texture, clear, casters, prefiltering, .. } = shadows;
         let stale_in = |layer: usize| {
             records.iter().enumerate().filter_map(move |(index, record)| {
@@ -100,7 +101,7 @@ impl Prepared<'_> {
             let writes = part(timestamps.depth.as_ref(), is_first, is_last);
             let mut pass = begin(encoder, &texture.layers[layer], load, writes);
             for (index, record, place) in stale_in(layer) {
-                aim(&mut pass, &place, gutter);
+                aim(&mut pass, &place, &filter);
                 if !is_whole {
                     pass.set_pipeline(&clear.pipeline);
                     pass.draw(0..3, 0..1);
@@ -119,7 +120,7 @@ impl Prepared<'_> {
             if let Some(prefiltering) = prefiltering {
                 let stale = stale_in(layer).map(|(index, _, place)| (index, place));
                 let writes = part(timestamps.filter.as_ref(), is_first, is_last);
-                prefiltering.encode(encoder, layer, stale, gutter, writes.as_ref());
+                prefiltering.encode(encoder, layer, stale, &filter, writes.as_ref());
             }
         }
         for record in records.iter_mut() {
@@ -150,10 +151,16 @@ fn begin<'e>(
     })
 }
 
-/// Sets viewport and scissor to a map with its gutter.
-pub(crate) fn aim(pass: &mut RenderPass<'_>, place: &Place, gutter: u32) {
-    let [x, y] = place.origin.map(|n| n - gutter);
-    let [w, h] = place.size.map(|n| n + 2 * gutter);
+/// Sets viewport and scissor to all that is drawn for a map.
+fn aim(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter) {
+    aim_level(pass, place, filter, 0);
+}
+
+/// The same in a copy that is 2^`level` times smaller.
+pub(crate) fn aim_level(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter, level: u32) {
+    let gutter = filter.reach_texels();
+    let [x, y] = place.origin.map(|n| (n - gutter) >> level);
+    let [w, h] = filter.drawn_texels(place.size).map(|n| n >> level);
     pass.set_viewport(x as f32, y as f32, w as f32, h as f32, 0.0, 1.0);
     pass.set_scissor_rect(x, y, w, h);
 }

@@ -1,15 +1,15 @@
 //! The passes of filters that are applied ahead of lookup.
 
 use crate::data::PrefilterMap;
-use crate::passes::{aim, part};
+use crate::passes::{aim_level, part};
 use crate::shadows::{DepthTexture, Record};
 use crate::wgsl::{self, PrefilterPass};
 use crate::{Error, Support};
 use std::mem::size_of;
 use std::num::NonZeroU64;
 use std::ops::Range;
-use umbrage::visibility::Prefilter;
 use umbrage::visibility::statistic::{Statistic, Storage};
+use umbrage::visibility::{Filter, Prefilter};
 use umbrage::{Place, Plan};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
@@ -30,10 +30,12 @@ pub(crate) struct Prefiltering {
     textures: u32,
     groups: Vec<Range<u32>>,
     format: TextureFormat,
+    levels: u32,
     is_blurred: bool,
     encode: Vec<RenderPipeline>,
     rows: Vec<RenderPipeline>,
     columns: Vec<RenderPipeline>,
+    halve: Vec<RenderPipeline>,
     encode_layout: BindGroupLayout,
     blur_layout: BindGroupLayout,
     stride: u32,
@@ -49,7 +51,9 @@ pub(crate) struct Prefiltering {
 #[derive(Debug)]
 struct Numbers {
     all: TextureView,
-    layers: Vec<TextureView>,
+    /// Of each level, what passes read and draw into.
+    sources: Vec<TextureView>,
+    layers: Vec<Vec<TextureView>>,
     bytes: u64,
 }
 
@@ -58,7 +62,8 @@ struct Numbers {
 struct Bindings {
     /// Depths, one a layer of maps.
     depths: Vec<BindGroup>,
-    numbers: BindGroup,
+    /// One a level.
+    numbers: Vec<BindGroup>,
     scratch: Option<BindGroup>,
 }
 
@@ -126,12 +131,14 @@ impl Prefiltering {
             };
             groups.iter().map(one).collect()
         };
-        let is_blurred = prefilter.blur_texels > 1;
+        let is_blurred = prefilter.radius_texels() > 0;
+        let levels = prefilter.levels();
         let blur = |pass| if is_blurred { pipelines(pass) } else { Vec::new() };
         let stride = (size_of::<PrefilterMap>() as u32).next_multiple_of(support.uniform_alignment);
         let uniforms = uniforms(device, stride);
-        let numbers = Numbers::new(device, support, format, depths, textures);
-        let scratch = is_blurred.then(|| Numbers::new(device, support, format, depths, textures));
+        let numbers = Numbers::new(device, support, format, depths, textures, levels);
+        let scratch =
+            is_blurred.then(|| Numbers::new(device, support, format, depths, textures, 1));
         let bindings = Bindings::new(
             device,
             [&encode_layout, &blur_layout],
@@ -143,7 +150,9 @@ impl Prefiltering {
         Ok(Self {
             textures,
             format,
+            levels,
             is_blurred,
+            halve: if levels > 1 { pipelines(PrefilterPass::Halve) } else { Vec::new() },
             encode: pipelines(PrefilterPass::Encode),
             rows: blur(PrefilterPass::Rows),
             columns: blur(PrefilterPass::Columns),
@@ -171,10 +180,10 @@ impl Prefiltering {
 
     /// Makes room for the maps of another depth texture.
     pub(crate) fn resize(&mut self, device: &Device, support: &Support, depths: &DepthTexture) {
-        self.numbers = Numbers::new(device, support, self.format, depths, self.textures);
-        self.scratch = self
-            .is_blurred
-            .then(|| Numbers::new(device, support, self.format, depths, self.textures));
+        let numbers =
+            |levels| Numbers::new(device, support, self.format, depths, self.textures, levels);
+        self.scratch = self.is_blurred.then(|| numbers(1));
+        self.numbers = numbers(self.levels);
         self.rebind(device, depths);
     }
 
@@ -197,7 +206,7 @@ impl Prefiltering {
         queue: &Queue,
         plan: &Plan,
         records: &[Record],
-        gutter: u32,
+        filter: &Filter,
         depths: &DepthTexture,
     ) {
         let stride = self.stride as usize;
@@ -206,7 +215,7 @@ impl Prefiltering {
         let maps = plan.maps.iter().zip(records).zip(self.bytes.chunks_exact_mut(stride));
         for ((map, record), bytes) in maps {
             if let Some(place) = record.place {
-                let uniform = PrefilterMap::new(map, &place, gutter, self.textures);
+                let uniform = PrefilterMap::new(map, &place, filter, self.textures);
                 bytes[..size_of::<PrefilterMap>()].copy_from_slice(bytemuck::bytes_of(&uniform));
             }
         }
@@ -224,18 +233,24 @@ impl Prefiltering {
         encoder: &mut CommandEncoder,
         layer: usize,
         stale: impl Iterator<Item = (usize, Place)> + Clone,
-        gutter: u32,
+        filter: &Filter,
         timestamps: Option<&RenderPassTimestampWrites<'_>>,
     ) {
         let numbers = &self.numbers.layers;
-        let mut steps = vec![(&self.encode, &self.bindings.depths[layer], numbers)];
-        if let (Some(scratch), Some(blurred)) = (&self.scratch, &self.bindings.scratch) {
-            steps.push((&self.rows, &self.bindings.numbers, &scratch.layers));
-            steps.push((&self.columns, blurred, numbers));
+        let Bindings { depths, numbers: sources, scratch: blurred } = &self.bindings;
+        // Pipelines, what they read, draw into, and at which level.
+        let mut steps = vec![(&self.encode, &depths[layer], &numbers[0], 0)];
+        if let (Some(scratch), Some(blurred)) = (&self.scratch, blurred) {
+            steps.push((&self.rows, &sources[0], &scratch.layers[0], 0));
+            steps.push((&self.columns, blurred, &numbers[0], 0));
+        }
+        for level in 1..self.levels {
+            let from = &sources[level as usize - 1];
+            steps.push((&self.halve, from, &numbers[level as usize], level));
         }
         let passes = steps.len() * self.groups.len();
         let mut index = 0;
-        for (pipelines, bindings, target) in steps {
+        for (pipelines, bindings, target, level) in steps {
             for (pipeline, range) in pipelines.iter().zip(&self.groups) {
                 let first = layer * self.textures as usize;
                 let attachments: Vec<_> =
@@ -252,7 +267,7 @@ impl Prefiltering {
                 });
                 pass.set_pipeline(pipeline);
                 for (map, place) in stale.clone() {
-                    aim(&mut pass, &place, gutter);
+                    aim_level(&mut pass, &place, filter, level);
                     pass.set_bind_group(0, bindings, &[map as u32 * self.stride]);
                     pass.draw(0..3, 0..1);
                 }
@@ -278,32 +293,43 @@ impl Numbers {
         format: TextureFormat,
         depths: &DepthTexture,
         textures: u32,
+        levels: u32,
     ) -> Self {
         let [width, height] = depths.size();
+        // Very small textures have fewer levels than maps have copies; nothing is ever drawn into those.
+        let levels = levels.min(width.max(height).max(1).ilog2() + 1);
         let layers = support.array_layers(textures * depths.layers.len() as u32);
         let texture = device.create_texture(&TextureDescriptor {
             label: Some("shadow numbers"),
             size: Extent3d { width, height, depth_or_array_layers: layers },
-            mip_level_count: 1,
+            mip_level_count: levels,
             sample_count: 1,
             dimension: TextureDimension::D2,
             format,
             usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         });
-        let view = |dimension, layer, count| {
+        let view = |layer: Option<u32>, level: Option<u32>| {
             texture.create_view(&TextureViewDescriptor {
-                dimension: Some(dimension),
-                base_array_layer: layer,
-                array_layer_count: count,
+                dimension: Some(match layer {
+                    Some(_) => TextureViewDimension::D2,
+                    None => TextureViewDimension::D2Array,
+                }),
+                base_array_layer: layer.unwrap_or(0),
+                array_layer_count: layer.map(|_| 1),
+                base_mip_level: level.unwrap_or(0),
+                mip_level_count: level.map(|_| 1),
                 ..TextureViewDescriptor::default()
             })
         };
-        let texel = format.block_copy_size(None).unwrap_or(0);
+        let texel = u64::from(format.block_copy_size(None).unwrap_or(0) * layers);
+        let bytes = |level: u32| u64::from(width >> level) * u64::from(height >> level) * texel;
+        let of_level = |level| (0..layers).map(|i| view(Some(i), Some(level))).collect();
         Self {
-            all: view(TextureViewDimension::D2Array, 0, None),
-            layers: (0..layers).map(|i| view(TextureViewDimension::D2, i, Some(1))).collect(),
-            bytes: u64::from(width) * u64::from(height) * u64::from(layers) * u64::from(texel),
+            all: view(None, None),
+            sources: (0..levels).map(|level| view(None, Some(level))).collect(),
+            layers: (0..levels).map(of_level).collect(),
+            bytes: (0..levels).map(bytes).sum(),
         }
     }
 }
@@ -336,7 +362,7 @@ impl Bindings {
         };
         Self {
             depths: depths.layers.iter().map(|view| bind(encode, view)).collect(),
-            numbers: bind(blur, &numbers.all),
+            numbers: numbers.sources.iter().map(|view| bind(blur, view)).collect(),
             scratch: scratch.map(|s| bind(blur, &s.all)),
         }
     }

@@ -13,9 +13,9 @@ use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d,
-    FilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor, ShaderStages,
-    Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
-    TextureView, TextureViewDescriptor, TextureViewDimension,
+    FilterMode, MipmapFilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor,
+    ShaderStages, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType,
+    TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
 /// Format of the depth texture.
@@ -199,6 +199,10 @@ impl Shadows {
             label: Some("shadow sampler"),
             mag_filter: filter_mode,
             min_filter: filter_mode,
+            mipmap_filter: match options.filter {
+                Filter::Prefiltered(_) => MipmapFilterMode::Linear,
+                _ => MipmapFilterMode::Nearest,
+            },
             // Lit is what is not nearer to the light than the limit.
             compare: compares(&options).then_some(CompareFunction::LessEqual),
             ..SamplerDescriptor::default()
@@ -358,8 +362,8 @@ impl Shadows {
         if let Some(map) = plan.maps.iter().position(|m| m.rows != Rows::Even && !m.is_empty()) {
             return Err(Error::LogarithmicRows { map });
         }
-        let gutter = self.options.filter.reach_texels();
-        self.slots.place(plan, self.options.layout, gutter, &self.support)?;
+        let filter = self.options.filter;
+        self.slots.place(plan, self.options.layout, &filter, &self.support)?;
         let (size, layers) = self.slots.size();
         self.lookup.fill(
             plan,
@@ -406,14 +410,14 @@ impl Shadows {
             }
             if record.stale_place().is_some() {
                 any_stale = true;
-                record.clip_from_render = clip_from_render(map, gutter, render_origin);
+                record.clip_from_render = clip_from_render(map, &filter, render_origin);
             }
         }
         if any_stale {
             self.casters.upload(device, queue, &self.records);
             let Self { records, texture, prefiltering, .. } = &mut *self;
             if let Some(prefiltering) = prefiltering {
-                prefiltering.upload(device, queue, plan, records, gutter, texture);
+                prefiltering.upload(device, queue, plan, records, &filter, texture);
             }
         }
         Ok(Prepared { shadows: self, plan, render_origin })

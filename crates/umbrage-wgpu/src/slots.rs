@@ -1,6 +1,7 @@
 //! Where in the depth texture the maps lie, from frame to frame.
 
 use crate::{Error, Layout, Support};
+use umbrage::visibility::Filter;
 use umbrage::{Atlas, Place, Plan};
 
 /// An atlas in which maps stay where they are while they fit.
@@ -39,7 +40,7 @@ impl Slots {
         &mut self,
         plan: &Plan,
         layout: Layout,
-        gutter: u32,
+        filter: &Filter,
         support: &Support,
     ) -> Result<bool, Error> {
         self.sizes.clear();
@@ -47,10 +48,10 @@ impl Slots {
         let moves = !self.holds_all() || self.wastes();
         if moves {
             // Without room rather than not at all.
-            let roomy = self.was_packed.then(|| self.pack(layout, true, gutter, support));
+            let roomy = self.was_packed.then(|| self.pack(layout, true, filter, support));
             self.atlas = match roomy {
                 Some(Ok(atlas)) => atlas,
-                _ => self.pack(layout, false, gutter, support)?,
+                _ => self.pack(layout, false, filter, support)?,
             };
             self.was_packed = true;
         }
@@ -88,16 +89,21 @@ impl Slots {
         &self,
         layout: Layout,
         with_room: bool,
-        gutter: u32,
+        filter: &Filter,
         support: &Support,
     ) -> Result<Atlas, Error> {
         let max_side = support.max_side;
+        let gutter = filter.reach_texels();
+        // What is drawn for a map has sides that are multiples of something, and with them where maps begin.
+        let aligned = |size: [u32; 2]| filter.drawn_texels(size).map(|n| n - 2 * gutter);
         let roomy = |n: u32| {
             let most = max_side.saturating_sub(2 * gutter).max(n);
             (n + n.div_ceil(ROOM)).min(most)
         };
-        let slot = |size: [u32; 2]| {
-            if with_room && !size.contains(&0) { size.map(roomy) } else { size }
+        let slot = |size: [u32; 2]| match size {
+            size if size.contains(&0) => size,
+            size if with_room => aligned(size.map(roomy)),
+            size => aligned(size),
         };
         let slots: Vec<[u32; 2]> = self.sizes.iter().copied().map(slot).collect();
         let fits = layout == Layout::Atlas || slots.len() <= support.max_layers as usize;
@@ -122,6 +128,8 @@ impl Slots {
 mod tests {
     use super::*;
     use umbrage::ShadowMap;
+    use umbrage::visibility::statistic::{Statistic, Vsm};
+    use umbrage::visibility::{Blur, Prefilter, Width};
 
     const SUPPORT: Support = Support {
         depth_clip_control: true,
@@ -138,13 +146,33 @@ mod tests {
         uniform_alignment: 256,
     };
 
+    /// Gutters of two texels.
+    const PCF3: Filter = Filter::Pcf { n: 3 };
+
+    #[test]
+    fn copies_of_half_the_size_keep_maps_apart() {
+        let statistic = Statistic::Vsm(Vsm::default());
+        let blur = Blur::Width(Width::Metres(1.0));
+        let filter = Filter::Prefiltered(Prefilter { statistic, blur });
+        let mut slots = Slots::default();
+        let sizes = [[100, 201], [31, 77], [65, 33], [1, 1]];
+        slots.place(&plan(&sizes), Layout::Atlas, &filter, &SUPPORT).unwrap();
+        let (size, _) = slots.size();
+        assert!(size.iter().all(|n| n.is_multiple_of(32)), "{size:?}");
+        for (place, size) in slots.places().iter().zip(sizes) {
+            let place = place.unwrap();
+            assert_eq!(place.size, size);
+            assert!(place.origin.iter().all(|n| n.is_multiple_of(32)), "{place:?}");
+        }
+    }
+
     fn plan(sizes: &[[u32; 2]]) -> Plan {
         let map = |&resolution: &[u32; 2]| ShadowMap { resolution, ..ShadowMap::default() };
         Plan { maps: sizes.iter().map(map).collect(), ..Plan::default() }
     }
 
     fn place(slots: &mut Slots, sizes: &[[u32; 2]]) -> bool {
-        slots.place(&plan(sizes), Layout::Atlas, 2, &SUPPORT).unwrap()
+        slots.place(&plan(sizes), Layout::Atlas, &PCF3, &SUPPORT).unwrap()
     }
 
     #[test]
@@ -181,11 +209,11 @@ mod tests {
     #[test]
     fn what_cannot_fit_is_an_error() {
         let mut slots = Slots::default();
-        let error = slots.place(&plan(&[[1022, 8]]), Layout::Atlas, 2, &SUPPORT).unwrap_err();
+        let error = slots.place(&plan(&[[1022, 8]]), Layout::Atlas, &PCF3, &SUPPORT).unwrap_err();
         assert!(error.to_string().contains("no room for 1 shadow maps"), "{error}");
         let five = plan(&[[8, 8]; 5]);
-        let error = slots.place(&five, Layout::Layers, 2, &SUPPORT).unwrap_err();
+        let error = slots.place(&five, Layout::Layers, &PCF3, &SUPPORT).unwrap_err();
         assert!(error.to_string().contains("5 maps do not fit into 4 layers"), "{error}");
-        assert!(slots.place(&five, Layout::Atlas, 2, &SUPPORT).unwrap());
+        assert!(slots.place(&five, Layout::Atlas, &PCF3, &SUPPORT).unwrap());
     }
 }

@@ -3,7 +3,7 @@
 use crate::{Comparison, Layout, ShadowOptions, Support};
 use std::ops::Range;
 use umbrage::visibility::statistic::Statistic;
-use umbrage::visibility::{Filter, Prefilter};
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 
 /// What a device without storage buffers can be told of: sizes of the uniform arrays.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -53,6 +53,10 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
         }
     };
     match filter {
+        Filter::Spread { n, width } => include_str!("wgsl/spread.wgsl")
+            .replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string())
+            .replace("{GUTTER}", &number(filter.reach_texels() as f32))
+            .replace("{WIDTH}", &metres(width)),
         Filter::Pcf { n } => pcf.replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string()),
         _ => hard.to_owned(),
     }
@@ -65,12 +69,30 @@ fn prefiltered(prefilter: &Prefilter, layout: Layout) -> String {
         Layout::Atlas => "0u".to_owned(),
         Layout::Layers => format!("{textures}u * shadow_maps[map].layer"),
     };
-    let deviation = prefilter.statistic.plane_deviations() * prefilter.deviation_texels() as f32;
-    statistic(&prefilter.statistic)
-        + &include_str!("wgsl/prefiltered.wgsl")
-            .replace("{FIRST_LAYER}", &first)
-            .replace("{TEXTURES}", &textures.to_string())
-            .replace("{PLANE_DEVIATION}", &number(deviation))
+    let filter = Filter::Prefiltered(*prefilter);
+    let footprint = match prefilter.blur {
+        Blur::Texels(_) => include_str!("wgsl/footprint_texels.wgsl")
+            .replace("{VARIANCE}", &number(prefilter.variance_texels() as f32)),
+        Blur::Width(width) => include_str!("wgsl/footprint_width.wgsl")
+            .replace("{DEVIATION}", &number(Prefilter::deviation() as f32))
+            .replace("{WIDTH}", &metres(width))
+            .replace("{LAST_LEVEL}", &number((prefilter.levels() - 1) as f32)),
+    };
+    let lookup = include_str!("wgsl/prefiltered.wgsl")
+        .replace("{FIRST_LAYER}", &first)
+        .replace("{TEXTURES}", &textures.to_string())
+        .replace("{GUTTER}", &number(filter.reach_texels() as f32))
+        .replace("{ALIGN}", &number(filter.align_texels() as f32))
+        .replace("{PLANE_DEVIATIONS}", &number(prefilter.statistic.plane_deviations()));
+    [statistic(&prefilter.statistic), footprint, lookup].join("\n")
+}
+
+/// A width in metres, as an expression of the receiver.
+fn metres(width: Width) -> String {
+    match width {
+        Width::Pixels(pixels) => format!("({pixels:?} * receiver.pixel_metres)"),
+        Width::Metres(metres) => number(metres),
+    }
 }
 
 /// Textures that a statistic's numbers take, at most four to each.
@@ -124,6 +146,8 @@ pub(crate) enum PrefilterPass {
     /// Along rows, then along columns.
     Rows,
     Columns,
+    /// Into a copy of half the resolution.
+    Halve,
 }
 
 /// The module of a pass that writes the textures in `range`, of those that the numbers take.
@@ -148,12 +172,15 @@ pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range
         };
         format!("    sum += {w:?} * ({} + {});", tap("-"), tap("+"))
     });
-    let text = choose(include_str!("wgsl/prefilter.wgsl"), &[("ENCODE", is_encode)])
-        .replace("{OUTPUTS}", &outputs)
-        .replace("{VALUES}", &values)
-        .replace("{DIRECTION}", direction)
-        .replace("{WEIGHT_0}", &number(weights[0]))
-        .replace("{TAPS}", &taps.collect::<Vec<_>>().join("\n"));
+    let text = choose(
+        include_str!("wgsl/prefilter.wgsl"),
+        &[("ENCODE", is_encode), ("HALVE", pass == PrefilterPass::Halve)],
+    )
+    .replace("{OUTPUTS}", &outputs)
+    .replace("{VALUES}", &values)
+    .replace("{DIRECTION}", direction)
+    .replace("{WEIGHT_0}", &number(weights[0]))
+    .replace("{TAPS}", &taps.collect::<Vec<_>>().join("\n"));
     if is_encode { statistic(&prefilter.statistic) + &text } else { text }
 }
 
@@ -246,15 +273,18 @@ mod tests {
         ]
     }
 
+    const PASSES: [PrefilterPass; 4] =
+        [PrefilterPass::Encode, PrefilterPass::Rows, PrefilterPass::Columns, PrefilterPass::Halve];
+
     #[test]
     fn every_pass_of_a_prefilter_is_valid() {
         for statistic in statistics() {
-            for blur_texels in [1, 3, 63] {
-                let filter = Prefilter { statistic, blur_texels };
+            let blurs = [1, 3, 63].map(Blur::Texels);
+            for blur in blurs.into_iter().chain([Blur::Width(Width::Metres(1.0))]) {
+                let filter = Prefilter { statistic, blur };
                 let all = textures(&statistic);
                 for range in [0..all, 0..1, all - 1..all] {
-                    for pass in [PrefilterPass::Encode, PrefilterPass::Rows, PrefilterPass::Columns]
-                    {
+                    for pass in PASSES {
                         validated(&prefilter(&filter, pass, range.clone()));
                     }
                 }
@@ -272,11 +302,15 @@ mod tests {
         }";
 
     fn variants() -> impl Iterator<Item = (ShadowOptions, bool)> {
-        let prefiltered = statistics()
-            .into_iter()
-            .map(|statistic| Filter::Prefiltered(Prefilter { statistic, blur_texels: 7 }));
+        let prefiltered = statistics().into_iter().flat_map(|statistic| {
+            let blurs =
+                [Blur::Texels(7), Blur::Width(Width::Metres(0.5)), Blur::Width(Width::Pixels(3.0))];
+            blurs.map(|blur| Filter::Prefiltered(Prefilter { statistic, blur }))
+        });
+        let widths = [Width::Metres(0.5), Width::Pixels(3.0)];
+        let spread = widths.map(|width| Filter::Spread { n: 5, width });
         let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
-        let filters = filters.chain(prefiltered);
+        let filters = filters.chain(prefiltered).chain(spread);
         let with = |filter| {
             let comparisons = [Comparison::PerTexel, Comparison::Hardware];
             comparisons.into_iter().flat_map(move |comparison| {
@@ -352,7 +386,7 @@ mod tests {
             m,
             "ShadowSettings",
             data::Settings,
-            [bias_texels, bias_metres, light_count, texture_scale]
+            [bias_texels, bias_metres, light_count, texture_scale, pixel_gradient]
         );
         check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, padding]);
         check_layout!(
@@ -377,7 +411,7 @@ mod tests {
         let (module, _) = validated(&mesh(&SUPPORT, true));
         check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
         let text = prefilter(
-            &Prefilter { statistic: statistics()[0], blur_texels: 3 },
+            &Prefilter { statistic: statistics()[0], blur: Blur::Texels(3) },
             PrefilterPass::Rows,
             0..1,
         );

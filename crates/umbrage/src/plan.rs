@@ -191,6 +191,8 @@ pub struct ShadowMap {
     pub caster_planes: Vec<Plane>,
     /// Local position of a spot light, from which the map's beams come; `None`: beams are parallel.
     pub apex: Option<DVec3>,
+    /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
+    pub pixel_gradient: DVec3,
 }
 
 /// The line of points that one (s, t) stands for, in world space, running away from the light.
@@ -205,7 +207,7 @@ pub struct Beam {
 }
 
 /// A surface point as a shadow map sees it: all that a shadow test needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Receiver {
     /// Shadow coordinates (s, t) of the point, by the matrix alone (before [`Rows`]).
     pub st: DVec2,
@@ -217,6 +219,11 @@ pub struct Receiver {
     /// What half a texel is worth in depth: half of the longest way across its
     /// [footprint](crate::aliasing::Footprint), laid along the beam.
     pub half_texel: f64,
+    /// How texels lie across the light: squares of the texels to a metre in s and in t, and the product of the two
+    /// directions (0 where they are perpendicular). A disc of radius r metres has r² times this for its covariance, but for a factor.
+    pub texel_metric: [f64; 3],
+    /// Width of a pixel of the viewer's picture here, metres.
+    pub pixel_metres: f64,
 }
 
 impl ShadowMap {
@@ -289,6 +296,12 @@ impl ShadowMap {
             depth: here.shadow.z,
             slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
             half_texel: 0.5 * here.footprint().longest() * here.depth_per_metre,
+            texel_metric: [
+                here.grad_s.length_squared(),
+                here.grad_t.length_squared(),
+                here.grad_s.dot(here.grad_t),
+            ],
+            pixel_metres: self.pixel_gradient.dot(local).max(0.0),
         })
     }
 

@@ -428,6 +428,7 @@ impl Default for ShadowMap {
             storage_factor: 0.0,
             caster_planes: Vec::new(),
             apex: None,
+            pixel_gradient: DVec3::ZERO,
         }
     }
 }
@@ -439,7 +440,9 @@ impl ShadowMap {
             [&mut self.cell, &mut self.caster_planes].map(std::mem::take);
         cell.clear();
         caster_planes.clear();
-        *self = Self { origin: camera.eye(), cell, caster_planes, ..Self::default() };
+        let pixel_gradient = camera.forward() * camera.pixel_width_per_depth();
+        let origin = camera.eye();
+        *self = Self { origin, cell, caster_planes, pixel_gradient, ..Self::default() };
     }
 }
 

@@ -5,7 +5,7 @@ use anyhow::{Error, Result, anyhow, bail, ensure};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{self, Prefilter};
+use umbrage::visibility::{self, Blur, Prefilter, Width};
 
 /// How a shadow map is looked up.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub(crate) enum Filter {
     /// One comparison with the nearest texel.
     Hard,
     /// The mean of N×N comparisons.
-    Pcf(u32),
+    Pcf(u32, Vec<FilterOption>),
     /// Variance, exponential, exponential variance and moment shadow maps.
     Blurred(BlurredKind, Vec<FilterOption>),
     /// Convolution shadow maps with M terms.
@@ -37,11 +37,49 @@ pub(crate) enum BlurredKind {
     Msm,
 }
 
+/// How wide a filter is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum BlurWidth {
+    Texels(u32),
+    Pixels(f32),
+    Metres(f32),
+}
+
+impl FromStr for BlurWidth {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let number = |digits: &str| match digits.parse::<f32>() {
+            Ok(w) if w > 0.0 && w <= 1e6 => Ok(w),
+            _ => bail!("`blur={text}` must be a positive number, as in blur=1.5px or blur=0.2m"),
+        };
+        if let Some(pixels) = text.strip_suffix("px") {
+            return number(pixels).map(Self::Pixels);
+        }
+        if let Some(metres) = text.strip_suffix('m') {
+            return number(metres).map(Self::Metres);
+        }
+        let n = parse_count(text, "blur=", 1..=Prefilter::MAX_BLUR)?;
+        ensure!(n % 2 == 1, "`blur={n}` must be an odd number of texels");
+        Ok(Self::Texels(n))
+    }
+}
+
+impl Display for BlurWidth {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Texels(n) => write!(f, "{n}"),
+            Self::Pixels(w) => write!(f, "{w}px"),
+            Self::Metres(w) => write!(f, "{w}m"),
+        }
+    }
+}
+
 /// An option in the parentheses behind a filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FilterOption {
-    /// `blur=N`: width of the filter, texels.
-    Blur(u32),
+    /// `blur=N`, `blur=Xpx`, `blur=Xm`: width of the filter in texels, pixels or metres.
+    Blur(BlurWidth),
     /// `leak=L`: what visibility is taken for shadow.
     Leak(f64),
     /// `exponent=C`: how steep an exponential is.
@@ -63,21 +101,42 @@ impl Filter {
     pub(super) fn executable(&self) -> Result<visibility::Filter> {
         let (statistic, options) = match self {
             Self::Hard => return Ok(visibility::Filter::Hard),
-            Self::Pcf(n) => return Ok(visibility::Filter::pcf(*n)?),
+            Self::Pcf(n, options) => {
+                let width = match blur(options) {
+                    None => return Ok(visibility::Filter::pcf(*n)?),
+                    Some(BlurWidth::Pixels(w)) => Width::Pixels(w),
+                    Some(BlurWidth::Metres(w)) => Width::Metres(w),
+                    Some(BlurWidth::Texels(_)) => {
+                        bail!("`{self}`: pcf is N texels wide unless told in px or m")
+                    }
+                };
+                let filter = visibility::Filter::Spread { n: *n, width };
+                filter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
+                return Ok(filter);
+            }
             Self::Pcss => {
                 bail!("`pcss` is not available in this version; `pcfN` and the blurred filters are")
             }
             Self::Blurred(kind, options) => (kind.statistic(options), options),
             Self::Csm(order, options) => (csm(*order, options)?, options),
         };
-        let blur = options.iter().find_map(|o| match o {
-            FilterOption::Blur(n) => Some(*n),
-            _ => None,
-        });
-        let prefilter = Prefilter { statistic, blur_texels: blur.unwrap_or(1) };
+        let blur = match blur(options) {
+            None => Blur::Texels(1),
+            Some(BlurWidth::Texels(n)) => Blur::Texels(n),
+            Some(BlurWidth::Pixels(w)) => Blur::Width(Width::Pixels(w)),
+            Some(BlurWidth::Metres(w)) => Blur::Width(Width::Metres(w)),
+        };
+        let prefilter = Prefilter { statistic, blur };
         prefilter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
         Ok(visibility::Filter::Prefiltered(prefilter))
     }
+}
+
+fn blur(options: &[FilterOption]) -> Option<BlurWidth> {
+    options.iter().find_map(|o| match o {
+        FilterOption::Blur(width) => Some(*width),
+        _ => None,
+    })
 }
 
 impl BlurredKind {
@@ -168,7 +227,7 @@ impl FromStr for Filter {
                 Ok(Self::Blurred(BlurredKind::Evsm2, options))
             }
             "hard" => no_options().and_then(|()| plain(Self::Hard)),
-            "pcf" => no_options().and_then(|()| Ok(Self::Pcf(numbered(1..=15)?))),
+            "pcf" => Ok(Self::Pcf(numbered(1..=15)?, parse_options(options, stem, &["blur=Wpx"])?)),
             "pcss" => no_options().and_then(|()| plain(Self::Pcss)),
             "vsm" => blurred(BlurredKind::Vsm),
             "esm" => blurred(BlurredKind::Esm),
@@ -195,7 +254,10 @@ impl Display for Filter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let options = match self {
             Self::Hard => return f.write_str("hard"),
-            Self::Pcf(n) => return write!(f, "pcf{n}"),
+            Self::Pcf(n, options) => {
+                write!(f, "pcf{n}")?;
+                options
+            }
             Self::Pcss => return f.write_str("pcss"),
             Self::Blurred(kind, options) => {
                 f.write_str(kind.name())?;
@@ -233,11 +295,7 @@ fn parse_options(text: Option<&str>, filter: &str, known: &[&str]) -> Result<Vec
                 "unknown option `{part}` of `{filter}`: did you mean `{}`?",
                 nearest(part, known)
             ),
-            ("blur", Some(n)) => {
-                let n = parse_count(n, "blur=", 1..=Prefilter::MAX_BLUR)?;
-                ensure!(n % 2 == 1, "`blur={n}` must be an odd number of texels");
-                FilterOption::Blur(n)
-            }
+            ("blur", Some(width)) => FilterOption::Blur(width.parse()?),
             ("leak", Some(leak)) => match leak.parse::<f64>() {
                 Ok(l) if (0.0..1.0).contains(&l) => FilterOption::Leak(l),
                 _ => bail!("`leak={leak}` must be a number of 0 to less than 1"),

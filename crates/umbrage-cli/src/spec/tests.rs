@@ -1,4 +1,4 @@
-use super::filter::{BlurredKind, FilterOption};
+use super::filter::{BlurWidth, BlurredKind, FilterOption};
 use super::partition::SliceOption;
 use super::*;
 use proptest::prelude::*;
@@ -19,7 +19,11 @@ fn every_part_is_understood() {
             faces: Faces::Sides,
             filter: Some(Filter::Csm(
                 16,
-                vec![FilterOption::Blur(7), FilterOption::Attenuation(1.0), FilterOption::Offset],
+                vec![
+                    FilterOption::Blur(BlurWidth::Texels(7)),
+                    FilterOption::Attenuation(1.0),
+                    FilterOption::Offset
+                ],
             )),
             size: Some(TexelSize::Exact([640, 480])),
         }
@@ -196,9 +200,33 @@ fn bad_specifications_say_what_would_be_right() {
 
 #[test]
 fn what_is_not_built_yet_says_so() {
-    for text in ["uniform:vsm", "uniform:csm8", "uniform:pcss", "uniform:evsm(blur=5)"] {
+    let error = "uniform:pcss".parse::<Technique>().unwrap_err().to_string();
+    assert!(error.contains("not available in this version"), "{error}");
+}
+
+#[test]
+fn every_filter_that_is_built_can_be_executed() {
+    for (text, expected) in [
+        ("uniform:vsm", "vsm"),
+        ("uniform:esm(blur=5,exponent=40)", "esm"),
+        ("uniform:evsm(blur=1.5px)", "evsm"),
+        ("uniform:evsm2(blur=0.2m,leak=0.1)", "evsm2"),
+        ("uniform:msm(leak=0.2)", "msm"),
+        ("uniform:csm8(blur=7,attenuation=1,offset,bits=16)", "csm8"),
+        ("uniform:pcf5(blur=2px)", "pcf5(blur=2px)"),
+    ] {
+        let technique: Technique = text.parse().unwrap();
+        assert_eq!(technique.filter.to_string(), expected);
+        assert_eq!(technique.spec.to_string(), text);
+    }
+    for (text, expected) in [
+        ("uniform:pcf5(blur=7)", "pcf is N texels wide unless told in px or m"),
+        ("uniform:vsm(blur=0m)", "positive number"),
+        ("uniform:vsm(blur=-1px)", "positive number"),
+        ("uniform:csm4(blur=8)", "odd number of texels"),
+    ] {
         let error = text.parse::<Technique>().unwrap_err().to_string();
-        assert!(error.contains("not available in this version"), "{text}: {error}");
+        assert!(error.contains(expected), "{text}: {error}");
     }
 }
 
@@ -222,7 +250,15 @@ fn warp() -> impl Strategy<Value = Warp> {
 }
 
 fn filter() -> impl Strategy<Value = Filter> {
-    let blur = || (0u32..32).prop_map(|n| FilterOption::Blur(2 * n + 1));
+    let width = || {
+        prop_oneof![
+            (1e-3f32..1e6).prop_map(BlurWidth::Pixels),
+            (1e-3f32..1e6).prop_map(BlurWidth::Metres),
+        ]
+        .prop_map(FilterOption::Blur)
+    };
+    let texels = (0u32..32).prop_map(|n| FilterOption::Blur(BlurWidth::Texels(2 * n + 1)));
+    let blur = move || prop_oneof![texels.clone(), width()];
     let blurred = |kind| {
         let leak = (0.0..1.0).prop_map(FilterOption::Leak);
         let exponent = (1e-3..80.0).prop_map(FilterOption::Exponent);
@@ -244,7 +280,8 @@ fn filter() -> impl Strategy<Value = Filter> {
     );
     prop_oneof![
         Just(Filter::Hard),
-        (1u32..=15).prop_map(Filter::Pcf),
+        (1u32..=15, proptest::option::of(width()))
+            .prop_map(|(n, width)| Filter::Pcf(n, width.into_iter().collect())),
         Just(Filter::Pcss),
         blurred(BlurredKind::Vsm),
         blurred(BlurredKind::Esm),

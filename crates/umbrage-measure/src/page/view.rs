@@ -253,6 +253,7 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
         ("Flicker", r.flicker.map(|share| format!("{} %", significant(share * 100.0)))),
         ("Maps", Some(count(u64::from(r.maps)))),
         ("Texels", Some(count(r.texels))),
+        ("Memory", r.bytes.map(|b| format!("{} KiB", count(b.div_ceil(1024))))),
         ("Time", times),
         ("Executed by", Some(r.backend.clone())),
     ]

@@ -226,6 +226,7 @@ impl Compared {
                 device: None,
                 maps: 1 + u32::from(name.contains("z2")),
                 texels: 1 << 20,
+                bytes: None,
                 metrics: measure(truth.visibility, visibility, counted).unwrap(),
                 error_px: measure_error_px(error_px, counted).unwrap(),
                 // One unknown figure, to be told from zero.

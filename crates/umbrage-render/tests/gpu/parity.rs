@@ -3,7 +3,7 @@
 use crate::{GPU, Set, scene};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{Filter, Prefilter};
+use umbrage::visibility::{Blur, Filter, Prefilter};
 use umbrage::{
     Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
 };
@@ -274,7 +274,7 @@ fn every_prefilter_in_four_scenes() {
         for (i, statistic) in statistics.into_iter().enumerate() {
             let (technique, options) = techniques()[[1, 4, 7][i % 3]];
             let plan = set.plan(&[light], &options);
-            let filter = Filter::Prefiltered(Prefilter { statistic, blur_texels: 5 });
+            let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5) });
             let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
             let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
             let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();

@@ -136,6 +136,7 @@ pub(crate) fn even_map(
         storage_factor: 1.0,
         caster_planes: Vec::new(),
         apex: None,
+        pixel_gradient: DVec3::ZERO,
     }
 }
 

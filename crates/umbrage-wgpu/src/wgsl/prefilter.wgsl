@@ -37,6 +37,17 @@ fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered 
     return ShadowPrefiltered({VALUES});
 }
 //ELSE
+//IF HALVE
+// Four texels of the level above.
+fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
+    let first = 2 * at;
+    let upper = textureLoad(shadow_prefilter_source, first, layer, 0)
+        + textureLoad(shadow_prefilter_source, first + vec2i(1, 0), layer, 0);
+    let lower = textureLoad(shadow_prefilter_source, first + vec2i(0, 1), layer, 0)
+        + textureLoad(shadow_prefilter_source, first + vec2i(1, 1), layer, 0);
+    return 0.25 * (upper + lower);
+}
+//ELSE
 fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
     let low = shadow_prefilter_map.low;
     let high = shadow_prefilter_map.high;
@@ -45,6 +56,7 @@ fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
 {TAPS}
     return sum;
 }
+//END
 
 @fragment
 fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered {

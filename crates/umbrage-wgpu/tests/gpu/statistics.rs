@@ -4,7 +4,7 @@
 use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::{Pod, Zeroable};
 use umbrage::visibility::statistic::{Channels, Csm, Esm, Evsm, MAX_CHANNELS, Msm, Statistic, Vsm};
-use umbrage::visibility::{Filter, Prefilter};
+use umbrage::visibility::{Blur, Filter, Prefilter};
 use umbrage::{Options, Size, Warp};
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows};
 
@@ -53,7 +53,7 @@ fn every_statistic_is_that_of_rust() {
         })
         .collect();
     for statistic in statistics() {
-        let filter = Filter::Prefiltered(Prefilter { statistic, blur_texels: 3 });
+        let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3) });
         let options = ShadowOptions { filter, ..ShadowOptions::default() };
         let shadows = Shadows::new(&bench.device, bench.support, &options).unwrap();
         let textures = statistic.channels().div_ceil(4);
@@ -104,7 +104,7 @@ fn every_statistic_is_that_of_rust() {
 fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
     let bench = bench();
     for statistic in statistics() {
-        let filter = Filter::Prefiltered(Prefilter { statistic, blur_texels: 9 });
+        let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(9) });
         let options = ShadowOptions { filter, ..ShadowOptions::default() };
         let mut shadows = Shadows::new(&bench.device, bench.support, &options).unwrap();
         let own = ["0.1", "0.9"].map(|depth| {
@@ -159,8 +159,8 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
             fn main(@builtin(global_invocation_id) id: vec3u) {
                 if (id.x < arrayLength(&inputs)) {
                     let i = inputs[id.x];
-                    let near = ShadowReceiver(i.texel, 0.05, vec2f(0.0), 0.0);
-                    let middle = ShadowReceiver(i.texel, 0.5, vec2f(0.0), 0.0);
+                    let near = ShadowReceiver(i.texel, 0.05, vec2f(0.0), 0.0, vec3f(0.0), 0.0);
+                    let middle = ShadowReceiver(i.texel, 0.5, vec2f(0.0), 0.0, vec3f(0.0), 0.0);
                     out[id.x] = vec2f(shadow_filtered(i.map, near), shadow_filtered(i.map, middle));
                 }
             }";

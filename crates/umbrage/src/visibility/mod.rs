@@ -36,8 +36,10 @@
 pub mod statistic;
 
 mod prefilter;
+mod width;
 
-pub use prefilter::Prefilter;
+pub use prefilter::{Blur, Footprint, Prefilter};
+pub use width::Width;
 
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
@@ -47,6 +49,9 @@ use std::fmt;
 
 /// Half a unit in the last place of single precision below 1.
 const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
+
+/// Gutter of filters whose width in texels has no end: what they would see beyond counts as the gutter's last texel.
+const SPREAD_REACH: u32 = 16;
 
 /// How far outside [0, 1]² shadow coordinates still count as inside.
 const ROUNDING: f64 = 1e-6;
@@ -66,7 +71,15 @@ pub enum Filter {
         /// Width of the box, texels, even or odd; clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
     },
-    /// Numbers in place of depths, blurred ahead of lookup.
+    /// Percentage-closer filtering over a width that knows the warp: n × n comparisons with the nearest texels, spread evenly over a square across the
+    /// light, or over a texel where that is wider.
+    Spread {
+        /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
+        n: u32,
+        /// Side of the square.
+        width: Width,
+    },
+    /// Numbers in place of depths, filtered ahead of lookup.
     Prefiltered(Prefilter),
 }
 
@@ -75,10 +88,16 @@ pub trait Texels {
     /// Depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
     fn depth(&self, i: i32, j: i32) -> f32;
 
-    /// What a prefiltered map has at a point in texel coordinates, between texels bilinearly. By default computed there and then, from the
-    /// depths around.
-    fn statistics(&self, map: &ShadowMap, prefilter: &Prefilter, texel: DVec2) -> Channels {
-        prefilter.sample(map, texel, |i, j| self.depth(i, j))
+    /// What a prefiltered map has at a point in texel coordinates, between texels bilinearly, and between levels 0, 1, 2 … of half, a quarter … the
+    /// resolution linearly. By default computed there and then, from the depths around.
+    fn statistics(
+        &self,
+        map: &ShadowMap,
+        prefilter: &Prefilter,
+        texel: DVec2,
+        lod: f64,
+    ) -> Channels {
+        prefilter.sample(map, texel, lod, |i, j| self.depth(i, j))
     }
 }
 
@@ -108,7 +127,36 @@ impl Filter {
         match self {
             Self::Hard => 0,
             Self::Pcf { n } => n.clamp(1, Self::MAX_PCF) / 2 + 1,
+            Self::Spread { .. } => SPREAD_REACH,
             Self::Prefiltered(prefilter) => prefilter.reach_texels(),
+        }
+    }
+
+    /// What the sides of a map with its gutters are rounded up to, texels. What is more lies behind the gutter's end, and is drawn like it.
+    pub fn align_texels(self) -> u32 {
+        match self {
+            Self::Prefiltered(prefilter) => prefilter.align_texels(),
+            _ => 1,
+        }
+    }
+
+    /// Sides of what is drawn for a map: its resolution, the gutter around it, and what that is rounded up to. Texel coordinates in it run from
+    /// −[`reach_texels`](Self::reach_texels).
+    pub fn drawn_texels(self, resolution: [u32; 2]) -> [u32; 2] {
+        let gutters = 2 * self.reach_texels();
+        resolution.map(|n| n.saturating_add(gutters).next_multiple_of(self.align_texels()))
+    }
+
+    /// That the parameters make sense.
+    ///
+    /// # Errors
+    /// Names the one that does not.
+    pub fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::Hard => Ok(()),
+            Self::Pcf { n } => Self::pcf(*n).map(drop),
+            Self::Spread { n, width } => Self::pcf(*n).and_then(|_| width.check()),
+            Self::Prefiltered(prefilter) => prefilter.check(),
         }
     }
 }
@@ -119,6 +167,7 @@ impl fmt::Display for Filter {
         match self {
             Self::Hard => f.write_str("hard"),
             Self::Pcf { n } => write!(f, "pcf{n}"),
+            Self::Spread { n, width } => write!(f, "pcf{n}(blur={width})"),
             Self::Prefiltered(prefilter) => prefilter.statistic.fmt(f),
         }
     }
@@ -163,11 +212,42 @@ pub fn visibility(
             let row_sum = |j| columns.sum(|i| f64::from(u8::from(is_lit(i, j))));
             (rows.sum(row_sum) / f64::from(n * n)) as f32
         }
+        Filter::Spread { n, width } => {
+            let n = n.clamp(1, Filter::MAX_PCF);
+            let [low, high] = drawn(map, filter);
+            // The sides of the square, as they lie in the map.
+            let side = width.metres(receiver);
+            let [ss, tt, st] = receiver.texel_metric.map(|m| m * side * side);
+            let across = ss.max(1.0).sqrt();
+            let shear = st / across;
+            let along = (tt - shear * shear).max(1.0).sqrt();
+            let at = |k: u32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
+            let mut lit = 0;
+            for v in (0..n).map(at) {
+                for u in (0..n).map(at) {
+                    let offset = DVec2::new(across * u, shear * u + along * v);
+                    let [i, j] = (texel + offset).clamp(low, high).floor().to_array();
+                    lit += u32::from(is_lit(i as i32, j as i32));
+                }
+            }
+            (f64::from(lit) / f64::from(n * n)) as f32
+        }
         Filter::Prefiltered(prefilter) => {
-            let channels = texels.statistics(map, &prefilter, texel);
-            prefilter.visibility(map, receiver, &channels)
+            let [low, high] = drawn(map, filter);
+            let footprint = prefilter.footprint(receiver);
+            let channels = footprint.gather(texel, [low, high], |texel, lod| {
+                texels.statistics(map, &prefilter, texel, lod)
+            });
+            prefilter.visibility(map, receiver, &footprint, &channels)
         }
     }
+}
+
+/// Where what is drawn for a map begins and ends, in texel coordinates; the end is just inside.
+fn drawn(map: &ShadowMap, filter: Filter) -> [DVec2; 2] {
+    let low = DVec2::splat(-f64::from(filter.reach_texels()));
+    let [width, height] = filter.drawn_texels(map.resolution).map(f64::from);
+    [low, low + DVec2::new(width, height) - 1e-3]
 }
 
 /// A receiver against the texels of a map.

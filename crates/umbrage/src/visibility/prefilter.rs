@@ -1,24 +1,86 @@
+use super::Width;
 use super::statistic::{Channels, MAX_CHANNELS, Statistic};
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
 
-/// Numbers in place of depths, blurred by a Gaussian ahead of lookup.
+/// Numbers in place of depths, filtered by a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prefilter {
     /// Which numbers.
     pub statistic: Statistic,
-    /// Width of the Gaussian, texels: its standard deviation is a quarter of that. An odd number, 1 ..=
-    /// [`MAX_BLUR`](Self::MAX_BLUR); 1 is no blur.
-    pub blur_texels: u32,
+    /// How wide the Gaussian is.
+    pub blur: Blur,
+}
+
+/// How wide a Gaussian is: its standard deviation is a quarter of that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Blur {
+    /// So many texels, wherever: blurred ahead of lookup. An odd number, 1 ..= [`Prefilter::MAX_BLUR`]; 1 is no blur.
+    Texels(u32),
+    /// A width that knows the warp: looked up in smaller and smaller copies of the map, and where texels are longer one way, at several
+    /// places along it.
+    Width(Width),
 }
 
 /// A Gaussian's standard deviation as a share of its width.
 const DEVIATION: f64 = 0.25;
 
+/// Standard deviation of what a level's sample averages over, as a share of its texel: the box that made it, and the interpolation
+/// between texels.
+const SAMPLE_DEVIATION: f64 = 0.5;
+
+/// The most places to each side of a [`Footprint`]'s middle: 15 in all, as texture units with anisotropy of 16 take.
+const MAX_SIDE: f64 = 7.0;
+
+/// Where a filter samples: at `2 side + 1` places, `step` apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Level of detail, from 0 to [`Prefilter::LEVELS`] less one.
+    pub lod: f64,
+    /// From place to place, texels.
+    pub step: DVec2,
+    /// Places to each side of the middle.
+    pub side: u32,
+    /// What is averaged over, texels²: variances in s and t, and covariance.
+    pub covariance: [f64; 3],
+}
+
+impl Footprint {
+    /// Weights of the places at distances 0 ..= `side`, before they are divided by their sum.
+    pub fn weight(side: u32, k: u32) -> f64 {
+        if side == 0 { 1.0 } else { (-2.0 * (f64::from(k) / f64::from(side)).powi(2)).exp() }
+    }
+
+    /// The mean over the places around `texel`, none nearer to the ends of what is drawn than half a texel of the level.
+    pub(super) fn gather(
+        &self,
+        texel: DVec2,
+        [low, high]: [DVec2; 2],
+        sample: impl Fn(DVec2, f64) -> Channels,
+    ) -> Channels {
+        let inset = DVec2::splat(0.5 * self.lod.ceil().exp2());
+        let [low, high] = [low + inset, high - inset];
+        let side = self.side as i32;
+        let mut sum = [0.0; MAX_CHANNELS];
+        let mut weights = 0.0;
+        for k in -side..=side {
+            let weight = Self::weight(self.side, k.unsigned_abs()) as f32;
+            weights += weight;
+            let at = (texel + self.step * f64::from(k)).clamp(low, high.max(low));
+            let here = sample(at, self.lod);
+            sum.iter_mut().zip(here).for_each(|(s, h)| *s += weight * h);
+        }
+        sum.map(|s| s / weights)
+    }
+}
+
 impl Prefilter {
     /// The widest blur, texels.
     pub const MAX_BLUR: u32 = 63;
+
+    /// Copies of a map, each of half the resolution of the one before, that [`Blur::Width`] samples.
+    pub const LEVELS: u32 = 6;
 
     /// That the parameters make sense.
     ///
@@ -26,21 +88,43 @@ impl Prefilter {
     /// Names the one that does not.
     pub fn check(&self) -> Result<(), Error> {
         self.statistic.check()?;
-        check(
-            (1..=Self::MAX_BLUR).contains(&self.blur_texels) && self.blur_texels % 2 == 1,
-            "filter.blur_texels",
-            || format!("must be an odd number of 1 to {}, is {}", Self::MAX_BLUR, self.blur_texels),
-        )
+        match self.blur {
+            Blur::Texels(n) => {
+                check((1..=Self::MAX_BLUR).contains(&n) && n % 2 == 1, "filter.blur", || {
+                    format!("must be an odd number of 1 to {} texels, is {n}", Self::MAX_BLUR)
+                })
+            }
+            Blur::Width(width) => width.check(),
+        }
     }
 
-    /// How many texels to each side the blur reaches.
+    /// How many levels there are.
+    pub fn levels(&self) -> u32 {
+        match self.blur {
+            Blur::Texels(_) => 1,
+            Blur::Width(_) => Self::LEVELS,
+        }
+    }
+
+    /// How many texels to each side the blur ahead of lookup reaches.
     pub fn radius_texels(&self) -> u32 {
-        self.blur_texels.min(Self::MAX_BLUR) / 2
+        match self.blur {
+            Blur::Texels(n) => n.min(Self::MAX_BLUR) / 2,
+            Blur::Width(_) => 0,
+        }
     }
 
-    /// How many texels beyond the map's border lookups of points in the map can reach: the blur's radius, and one more to interpolate.
-    pub fn reach_texels(&self) -> u32 {
-        self.radius_texels() + 1
+    pub(super) fn align_texels(&self) -> u32 {
+        1 << (self.levels() - 1)
+    }
+
+    /// How many texels beyond the map's border lookups of points in the map can reach: the blur's radius, and one more to interpolate; or
+    /// the largest texel there is.
+    pub(super) fn reach_texels(&self) -> u32 {
+        match self.blur {
+            Blur::Texels(_) => self.radius_texels() + 1,
+            Blur::Width(_) => self.align_texels(),
+        }
     }
 
     /// Weights of the texels at distances 0 ..= [`radius_texels`](Self::radius_texels) to one side; with those to the other side they add up
@@ -53,15 +137,54 @@ impl Prefilter {
         (0..=radius).map(move |k| (gaussian(k) / sum) as f32)
     }
 
-    /// Standard deviation of all that lookup averages over, in one direction, texels: the blur and the interpolation between texels.
-    pub fn deviation_texels(&self) -> f64 {
+    /// Variance of all that lookup in a map that was blurred averages over, in one direction, texels²: the blur and the interpolation
+    /// between texels.
+    pub fn variance_texels(&self) -> f64 {
         let blur: f64 = self
             .weights()
             .zip(0u32..)
             .map(|(w, k)| 2.0 * f64::from(w) * f64::from(k).powi(2))
             .sum();
         // Of the linear weights between texels, in the mean over all places.
-        (blur + 1.0 / 6.0).sqrt()
+        blur + 1.0 / 6.0
+    }
+
+    /// Standard deviation of a filter that knows the warp, as a share of its width.
+    pub const fn deviation() -> f64 {
+        DEVIATION
+    }
+
+    /// Where to sample for a receiver.
+    pub fn footprint(&self, receiver: &Receiver) -> Footprint {
+        let Blur::Width(width) = self.blur else {
+            let variance = self.variance_texels();
+            return Footprint {
+                lod: 0.0,
+                step: DVec2::ZERO,
+                side: 0,
+                covariance: [variance, variance, 0.0],
+            };
+        };
+        let deviation = DEVIATION * width.metres(receiver);
+        let [ss, tt, st] = receiver.texel_metric.map(|m| m * deviation * deviation);
+        let mean = 0.5 * (ss + tt);
+        let spread = (0.5 * (ss - tt)).hypot(st);
+        let [major, minor] = [(mean + spread).sqrt(), (mean - spread).max(0.0).sqrt()];
+        // The smallest level whose samples are as wide as the narrow side, or which reaches along the long one.
+        let wanted = minor.max(major / MAX_SIDE) / SAMPLE_DEVIATION;
+        let lod = wanted.log2().clamp(0.0, f64::from(Self::LEVELS - 1));
+        let sample = SAMPLE_DEVIATION * lod.exp2();
+        let rest = (major * major - sample * sample).max(0.0).sqrt();
+        let side = (2.0 * rest / lod.exp2()).ceil().min(MAX_SIDE);
+        // An eigenvector, by the row of the matrix that has more digits.
+        let axis = if ss > tt {
+            DVec2::new(0.5 * (ss - tt) + spread, st)
+        } else {
+            DVec2::new(st, 0.5 * (tt - ss) + spread)
+        };
+        let step = axis.normalize_or_zero() * (2.0 * rest / side.max(1.0));
+        let least = sample * sample;
+        Footprint { lod, step, side: side as u32, covariance: [ss.max(least), tt.max(least), st] }
     }
 
     /// The numbers of one texel of this depth, before they are stored.
@@ -72,51 +195,81 @@ impl Prefilter {
         self.statistic.encode(map.linear_depth(st, f64::from(depth)).clamp(0.0, 1.0) as f32)
     }
 
-    /// What a blurred map has at a point in texel coordinates, computed there and then from the depths around, and never stored.
+    /// What a filtered map has at a point in texel coordinates, computed there and then from the depths around, and never stored.
     pub(super) fn sample(
         &self,
         map: &ShadowMap,
         texel: DVec2,
+        lod: f64,
+        depth: impl Fn(i32, i32) -> f32,
+    ) -> Channels {
+        let lower = lod.floor();
+        let at = |level: f64| self.sample_level(map, texel, level.exp2() as i32, &depth);
+        let fraction = (lod - lower) as f32;
+        let mut sum = at(lower);
+        if fraction > 0.0 {
+            let upper = at(lower + 1.0);
+            sum.iter_mut().zip(upper).for_each(|(s, u)| *s += fraction * (u - *s));
+        }
+        sum
+    }
+
+    /// The same between texels of `size` texels.
+    fn sample_level(
+        &self,
+        map: &ShadowMap,
+        texel: DVec2,
+        size: i32,
         depth: impl Fn(i32, i32) -> f32,
     ) -> Channels {
         let mut sum = [0f64; MAX_CHANNELS];
         let radius = self.radius_texels() as i32;
-        let weights: [f32; Self::MAX_BLUR as usize / 2 + 1] = {
-            let mut table = [0.0; Self::MAX_BLUR as usize / 2 + 1];
-            table.iter_mut().zip(self.weights()).for_each(|(t, w)| *t = w);
-            table
-        };
-        let corner = texel - 0.5;
+        let mut weights = [0.0; Self::MAX_BLUR as usize / 2 + 1];
+        weights.iter_mut().zip(self.weights()).for_each(|(t, w)| *t = f64::from(w));
+        let corner = texel / f64::from(size) - 0.5;
         let first = corner.floor();
         let fraction = corner - first;
         // Weight of a texel along one axis: two Gaussians, as far as the point is from each.
         let along = |k: i32, fraction: f64| {
-            let at = |k: i32| weights.get(k.unsigned_abs() as usize).copied().unwrap_or(0.0);
-            let inside = |k: i32| if k.abs() <= radius { f64::from(at(k)) } else { 0.0 };
-            (1.0 - fraction) * inside(k) + fraction * inside(k - 1)
+            let at = |k: i32| {
+                let weight = weights.get(k.unsigned_abs() as usize).copied().unwrap_or(0.0);
+                if k.abs() <= radius { weight } else { 0.0 }
+            };
+            (1.0 - fraction) * at(k) + fraction * at(k - 1)
         };
+        let share = 1.0 / f64::from(size * size);
         for y in -radius..=radius + 1 {
             for x in -radius..=radius + 1 {
-                let weight = along(x, fraction.x) * along(y, fraction.y);
+                let weight = share * along(x, fraction.x) * along(y, fraction.y);
                 if weight > 0.0 {
-                    let [i, j] = [first.x as i32 + x, first.y as i32 + y];
-                    let channels = self.encode(map, i, j, depth(i, j));
-                    sum.iter_mut().zip(channels).for_each(|(s, c)| *s += weight * f64::from(c));
+                    let [i, j] = [first.x as i32 + x, first.y as i32 + y].map(|k| k * size);
+                    for (i, j) in (0..size * size).map(|k| (i + k % size, j + k / size)) {
+                        let channels = self.encode(map, i, j, depth(i, j));
+                        sum.iter_mut().zip(channels).for_each(|(s, c)| *s += weight * f64::from(c));
+                    }
                 }
             }
         }
         sum.map(|s| s as f32)
     }
 
-    /// How much of the light reaches `receiver`, 0 to 1, by what a blurred map has there.
-    pub fn visibility(&self, map: &ShadowMap, receiver: &Receiver, channels: &Channels) -> f32 {
+    /// How much of the light reaches `receiver`, 0 to 1, by the mean over its footprint.
+    pub fn visibility(
+        &self,
+        map: &ShadowMap,
+        receiver: &Receiver,
+        footprint: &Footprint,
+        channels: &Channels,
+    ) -> f32 {
         let [width, height] = map.resolution.map(f64::from);
-        let slope = (receiver.slope / DVec2::new(width, height))
-            .clamp(DVec2::splat(-8.0), DVec2::splat(8.0));
-        let plane =
-            f64::from(self.statistic.plane_deviations()) * self.deviation_texels() * slope.length();
+        // Edge-on to the light the slope has no end: 8 in a texel is as good as infinite where all of depth is 1.
+        let slope = receiver.slope / DVec2::new(width, height);
+        let slope = slope.clamp(DVec2::splat(-8.0), DVec2::splat(8.0));
+        let [ss, tt, st] = footprint.covariance;
+        let variance =
+            ss * slope.x * slope.x + tt * slope.y * slope.y + 2.0 * st * slope.x * slope.y;
+        let plane = f64::from(self.statistic.plane_deviations()) * variance.max(0.0).sqrt();
         let expected = receiver.depth.min(1.0) - receiver.half_texel - plane;
-        // An edge-on receiver has no plane to speak of; then nothing hides it.
         let depth = map.linear_depth(receiver.st, expected);
         self.statistic.visibility(channels, depth as f32)
     }

@@ -9,7 +9,7 @@ fn map(resolution: [u32; 2], rows: Rows) -> ShadowMap {
 }
 
 fn flat(s: f64, t: f64, depth: f64) -> Receiver {
-    Receiver { st: DVec2::new(s, t), depth, slope: DVec2::ZERO, half_texel: 0.0 }
+    Receiver { st: DVec2::new(s, t), depth, ..Receiver::default() }
 }
 
 fn filters() -> impl Iterator<Item = Filter> {
@@ -84,7 +84,7 @@ proptest! {
         let slope = DVec2::from_angle(azimuth) / elevation.tan();
         for rows in [Rows::Even, Rows::Logarithmic { ratio }] {
             let map = map([37, 23], rows);
-            let receiver = Receiver { st: DVec2::new(s, t), depth: 0.4, slope, half_texel: 0.0 };
+            let receiver = Receiver { st: DVec2::new(s, t), depth: 0.4, slope, ..Receiver::default() };
             let stored = |i: i32, j: i32| {
                 let row = (f64::from(j) + 0.5) / 23.0;
                 let center = DVec2::new((f64::from(i) + 0.5) / 37.0, rows.t_from_row(row));
@@ -108,7 +108,7 @@ proptest! {
             (DVec2::NAN, DVec2::NAN),
         ] {
             for filter in filters() {
-                let receiver = Receiver { st, depth, slope, half_texel };
+                let receiver = Receiver { st, depth, slope, half_texel, ..Receiver::default() };
                 let v = visibility(&map([3, 3], Rows::Even), filter, &receiver, |_, _| stored);
                 prop_assert!((0.0..=1.0).contains(&v), "{v}");
             }
