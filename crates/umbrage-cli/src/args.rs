@@ -419,7 +419,10 @@ WARP:   unfocused, uniform, uniform(stable), psm, lispsm, tsm,
         length; +z4(fitted,overlap=0.1) does both.
 +face:  maps for the four sides of the view and its near face;
         +face(sides) without the near face.
-FILTER: hard (default), or pcfN for the mean over N×N texels.
+FILTER: hard (default); pcfN for the mean over N×N texels; vsm, esm, evsm,
+        evsm2, msm, csmM (M = 1 to 16) with (blur=7) texels.
+        (blur=2px) and (blur=0.3m) are as wide near as far, for pcfN too.
+        csmM also takes attenuation=A, offset, scale and bits=16.
 TEXELS: a budget of TEXELS² texels for all maps, shared among them and
         between s and t as the view needs it (default 1024), or WxH for
         exactly these in every map.";

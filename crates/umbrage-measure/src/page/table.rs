@@ -95,9 +95,9 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
         ))),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
         whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
-        whole(column("Memory", "KiB", "What lookup reads of the maps", |r| {
+        rare(whole(column("Memory", "KiB", "What lookup reads of the maps", |r| {
             r.bytes.map(|b| (b as f64 / 1024.0).ceil())
-        })),
+        }))),
         time(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),
         time(column("Depth", "ms", "Time to render the maps", |r| r.ms.depth)),
         time(column("Filter", "ms", "Time to filter the maps ahead of lookup", |r| r.ms.filter)),

@@ -3,7 +3,7 @@
 use crate::{GPU, Set, scene};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Prefilter};
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 use umbrage::{
     Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
 };
@@ -275,6 +275,37 @@ fn every_prefilter_in_four_scenes() {
             let (technique, options) = techniques()[[1, 4, 7][i % 3]];
             let plan = set.plan(&[light], &options);
             let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5) });
+            let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
+            let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
+            let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
+            let difference = compare(&set, &plan, (0, &light), filter, &samples, &reference);
+            check(name, technique, filter, &difference);
+        }
+    }
+}
+
+/// Widths in pixels and metres: smaller copies of maps, and several samples along a footprint.
+#[test]
+fn every_width_in_four_scenes() {
+    let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
+    let prefilter =
+        |statistic, width| Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width) });
+    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+        let scene = scene(name);
+        let set = Set::new(&scene, IMAGE);
+        let light = set.light();
+        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+        let filters = [
+            Filter::Spread { n: 5, width: Width::Pixels(3.0) },
+            Filter::Spread { n: 4, width: Width::Metres(0.5) },
+            prefilter(Statistic::Vsm(Vsm::default()), Width::Pixels(4.0)),
+            prefilter(csm, Width::Pixels(2.0)),
+            prefilter(csm, Width::Metres(0.6)),
+            prefilter(Statistic::Msm(Msm::default()), Width::Metres(3.0)),
+        ];
+        for (i, filter) in filters.into_iter().enumerate() {
+            let (technique, options) = techniques()[[1, 4, 7][i % 3]];
+            let plan = set.plan(&[light], &options);
             let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
             let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
             let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();

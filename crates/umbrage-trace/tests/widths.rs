@@ -1,0 +1,83 @@
+//! A filter's width is what it was told to be, near and far, under any warp and in every slice.
+
+mod common;
+
+use common::{ground, nobody, scene, sheet};
+use glam::{DAffine3, DVec3, Vec3};
+use umbrage::visibility::{Filter, Width};
+use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Partition, Planner, Size, Warp};
+use umbrage_trace::{Reference, Tracer, View};
+
+/// Light that falls a little sideways onto the ground, past the straight edge of a sheet 3 m above it.
+const LIGHT: DVec3 = DVec3::new(0.2, -1.0, 0.0);
+/// Where the edge's shadow lies.
+const EDGE_X: f64 = 0.6;
+
+fn camera() -> Camera {
+    Camera::look_at(LookAt {
+        eye: DVec3::new(3.0, 2.0, 20.0),
+        target: DVec3::new(EDGE_X, 0.0, 0.0),
+        up: DVec3::Y,
+        fov_y_rad: 1.2,
+        near: 0.5,
+        far: 60.0,
+        image: [1280, 720],
+    })
+    .unwrap()
+}
+
+/// How far apart, across the light, visibility passes 10% and 90% on the ground, at some distances along the edge.
+fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<(f64, f64)> {
+    let over = sheet(Vec3::new(-50.0, 3.0, -60.0), Vec3::Z * 120.0, Vec3::X * 50.0);
+    let scene =
+        scene(vec![ground(60.0), over], &[(0, DAffine3::IDENTITY), (1, DAffine3::IDENTITY)]);
+    let tracer = Tracer::new(&scene).unwrap();
+    let camera = camera();
+    let light = Light::Directional { direction: LIGHT };
+    let options = Options {
+        warp,
+        partition: Partition { overlap: 0.2, ..Partition::slices(slices) },
+        size: Size::Budget(1536 * 1536),
+        ..Options::default()
+    };
+    let bounds = Bounds::of_scene(scene.bounds());
+    let mut planner = Planner::new();
+    let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
+    let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
+    let view = View::new(&tracer, camera, light, 1).unwrap();
+    let lit = |x: f64, z: f64| {
+        let pixel = camera.pixel(DVec3::new(x, 0.0, z)).unwrap();
+        f64::from(reference.visibility(0, &view.sample(pixel).unwrap()))
+    };
+    [14.0, 8.0, 0.0, -12.0, -25.0]
+        .into_iter()
+        .map(|z| {
+            let passes = |level: f64| {
+                let step = 0.004;
+                let first = (-500..500).map(|i| EDGE_X + f64::from(i) * step);
+                first.into_iter().find(|&x| lit(x, z) >= level).unwrap()
+            };
+            // Across the light the ground is foreshortened.
+            let across = (passes(0.9) - passes(0.1)) * LIGHT.normalize().y.abs();
+            (20.0 - z, across)
+        })
+        .collect()
+}
+
+#[test]
+fn widths_are_as_told_everywhere() {
+    let techniques = [
+        (Warp::Uniform, 1),
+        (Warp::Lispsm, 1),
+        (Warp::Adaptive(Objective::Storage), 4),
+        (Warp::Psm, 1),
+    ];
+    // A box rises from 10% to 90% over 0.8 of its width.
+    let filter = Filter::Spread { n: 15, width: Width::Metres(1.2) };
+    for (warp, slices) in techniques {
+        for (distance, across) in ramps(filter, warp, slices) {
+            let ratio = across / (0.8 * 1.2);
+            assert!((ratio - 1.0).abs() < 0.2, "{warp:?} at {distance} m: {across}");
+        }
+    }
+}
