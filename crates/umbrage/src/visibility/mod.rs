@@ -182,6 +182,7 @@ pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
 /// How much of the light reaches `receiver`, from 0 to 1, by `map`'s texels: a function from (i, j) to depth, also of those up to
 /// [`Filter::reach_texels`] outside the map, or what holds more than depths. Receivers outside the map, or before its
 /// depths, are lit.
+#[expect(clippy::needless_pass_by_value, reason = "functions are handed over as they are written")]
 pub fn visibility(
     map: &ShadowMap,
     filter: Filter,

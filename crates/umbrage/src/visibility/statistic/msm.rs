@@ -26,6 +26,7 @@ const STORED_FROM_MOMENTS: [[f32; 4]; 4] = [
 const OFFSET: f32 = 0.035_955_884;
 
 /// And back.
+#[expect(clippy::excessive_precision, reason = "the paper's digits")]
 const MOMENTS_FROM_STORED: [[f32; 4]; 4] = [
     [0.222_774_41, 0.077_197_286, 0.792_698_66, 0.031_941_755],
     [0.154_967_93, 0.139_462_94, 0.796_341_6, -0.172_282_32],
