@@ -120,7 +120,7 @@ impl Prepared<'_> {
             if let Some(prefiltering) = prefiltering {
                 let stale = stale_in(layer).map(|(index, _, place)| (index, place));
                 let writes = part(timestamps.filter.as_ref(), is_first, is_last);
-                prefiltering.encode(encoder, layer, stale, &filter, writes.as_ref());
+                prefiltering.encode(encoder, layer, &stale, &filter, writes.as_ref());
             }
         }
         for record in records.iter_mut() {

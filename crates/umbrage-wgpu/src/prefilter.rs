@@ -232,7 +232,7 @@ impl Prefiltering {
         &self,
         encoder: &mut CommandEncoder,
         layer: usize,
-        stale: impl Iterator<Item = (usize, Place)> + Clone,
+        stale: &(impl Iterator<Item = (usize, Place)> + Clone),
         filter: &Filter,
         timestamps: Option<&RenderPassTimestampWrites<'_>>,
     ) {

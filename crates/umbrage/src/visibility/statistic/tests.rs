@@ -70,7 +70,7 @@ fn means_of_two_depths_are_between() {
             match statistic {
                 // Bounds from above, tight where the receiver lies at one of the two depths.
                 Statistic::Vsm(_) | Statistic::Evsm(Evsm { components: 2, .. }) => {
-                    assert!(lit >= expected - 1e-3, "{statistic} {share}: {lit}")
+                    assert!(lit >= expected - 1e-3, "{statistic} {share}: {lit}");
                 }
                 Statistic::Esm(_) => assert!(lit >= expected, "{statistic} {share}: {lit}"),
                 // One term is a ramp as long as all of depth.
@@ -81,7 +81,7 @@ fn means_of_two_depths_are_between() {
                     assert!((lit - doubled).abs() < 0.2, "{statistic} {share}: {lit}");
                 }
                 _ => {
-                    assert!((lit - expected).abs() < 0.11, "{statistic} {share}: {lit} {expected}")
+                    assert!((lit - expected).abs() < 0.11, "{statistic} {share}: {lit} {expected}");
                 }
             }
         }
