@@ -102,20 +102,24 @@ impl<'a> Sets<'a> {
 
     /// Rows that rendering a plan's maps will report.
     pub(crate) fn rows(&self, plan: &Plan, technique: &Technique) -> u64 {
-        let is_gpu = self.gpu.is_some() && runs_on_gpu(technique);
-        if is_gpu { 0 } else { Reference::rows(plan, technique.filter) }
+        self.gpu_for(technique).map_or_else(|| Reference::rows(plan, technique.filter), |_| 0)
+    }
+
+    /// The GPU, if there is one that can render a technique.
+    fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers<'a>)> {
+        self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
     }
 
     /// Who renders a technique.
     pub(crate) fn executor(&self, technique: &Technique) -> Result<Executor<'_>> {
         let filter = technique.filter;
-        match &self.gpu {
-            Some((gpu, buffers)) if runs_on_gpu(technique) => {
+        match self.gpu_for(technique) {
+            Some((gpu, buffers)) => {
                 let options = ShadowOptions { filter, ..ShadowOptions::default() };
                 let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
                 Ok(Executor::Gpu(Box::new(OnGpu { renderer, gpu, plan: None })))
             }
-            _ => Ok(Executor::Reference { tracer: &self.tracer, filter, maps: None }),
+            None => Ok(Executor::Reference { tracer: &self.tracer, filter, maps: None }),
         }
     }
 }
@@ -132,6 +136,16 @@ pub(crate) struct OnGpu<'a> {
     gpu: &'a Gpu,
     /// Whose maps are drawn.
     plan: Option<&'a Plan>,
+}
+
+impl OnGpu<'_> {
+    /// What rows of a picture look like; where texels lie only if that is wanted.
+    fn strip(&mut self, rows: &Rows<'_>, wants_texels: bool) -> Result<Strip> {
+        let (camera, grid) = (rows.view.camera(), rows.view.grid());
+        let look = Look { camera, light: rows.view.light(), light_index: 0 };
+        let samples = self.renderer.samples(&look, rows.range.clone(), grid, wants_texels)?;
+        Ok(Strip::of_gpu(&samples, grid, camera))
+    }
 }
 
 impl<'a> Executor<'a> {
@@ -171,12 +185,7 @@ impl<'a> Executor<'a> {
     /// What rows of a picture look like. The maps must be rendered.
     pub(crate) fn strip(&mut self, rows: &Rows<'_>) -> Result<Strip> {
         match self {
-            Self::Gpu(on) => {
-                let (camera, grid) = (rows.view.camera(), rows.view.grid());
-                let look = Look { camera, light: rows.view.light(), light_index: 0 };
-                let samples = on.renderer.samples(&look, rows.range.clone(), grid, true)?;
-                Ok(Strip::of_gpu(&samples, grid, camera))
-            }
+            Self::Gpu(on) => on.strip(rows, true),
             Self::Reference { maps, .. } => {
                 let (plan, reference) = maps.as_ref().context("maps are rendered first")?;
                 Ok(rows.by_reference(plan, reference))
@@ -188,7 +197,7 @@ impl<'a> Executor<'a> {
     pub(crate) fn shape(&mut self, rows: &Rows<'_>) -> Result<Strip> {
         match self {
             // Maps that there are not let all light through.
-            Self::Gpu(_) => self.strip(rows),
+            Self::Gpu(on) => on.strip(rows, false),
             Self::Reference { .. } => Ok(rows.in_full_light()),
         }
     }

@@ -4,6 +4,7 @@ use crate::timer::Timer;
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
+use std::collections::HashMap;
 use std::mem::{offset_of, size_of};
 use std::ops::Range;
 use umbrage::{Camera, Light, Plan, ShadowMap};
@@ -38,7 +39,8 @@ pub struct Renderer<'g, 's> {
     view_group: BindGroup,
     shader: ShaderModule,
     layout: PipelineLayout,
-    frame: [RenderPipeline; 2],
+    /// By the names of their fragment shaders; made when they are first used.
+    pictures: HashMap<&'static str, [RenderPipeline; 2]>,
     instances: Instances,
     eye: DVec3,
 }
@@ -255,7 +257,6 @@ impl<'g, 's> Renderer<'g, 's> {
             ],
             immediate_size: 0,
         });
-        let frame = pipelines(gpu, &shader, &layout, "frame", &[FRAME_FORMAT]);
         let instances =
             Instances { list: Vec::new(), draws: Vec::new(), buffer: instance_buffer(gpu, 4096) };
         gpu.check()?;
@@ -271,7 +272,7 @@ impl<'g, 's> Renderer<'g, 's> {
             view_group,
             shader,
             layout,
-            frame,
+            pictures: HashMap::new(),
             instances,
             eye: DVec3::ZERO,
         })
@@ -293,7 +294,7 @@ impl<'g, 's> Renderer<'g, 's> {
         casters: Casters<'_>,
         timer: Option<&Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
-        let Self { gpu, scene, shadows, instances, .. } = self;
+        let Self { gpu, scene, shadows, instances, opaque, masked, masks, .. } = self;
         let frame = Frame { plan, render_origin: plan.origin, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = plan.origin;
@@ -312,8 +313,6 @@ impl<'g, 's> Renderer<'g, 's> {
         }
         instances.upload(gpu)?;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let pipelines = CasterPipelines { opaque: &self.opaque, masked: &self.masked };
-        let masks = &self.masks;
         let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
         prepared.encode(&mut encoder, &timestamps, |map| {
             let list = lists.iter().find(|(index, _)| *index == map.index);
@@ -323,8 +322,9 @@ impl<'g, 's> Renderer<'g, 's> {
             for draw in draws {
                 let material = scene.meshes[draw.mesh].material;
                 let mask = masks[material].as_ref();
+                let casters = if mask.is_some() { &*masked } else { &*opaque };
                 drawer.choose(usize::from(mask.is_some()), |pass| {
-                    pipelines.set(pass, mask.is_some());
+                    pass.set_pipeline(casters.pipeline());
                 });
                 if let Some(mask) = mask {
                     drawer.pass.set_bind_group(1, mask, &[]);
@@ -350,7 +350,7 @@ impl<'g, 's> Renderer<'g, 's> {
         timer: Option<&Timer>,
     ) -> Result<Drawn, Error> {
         let tile = Tile::whole(look.camera);
-        let pipelines = self.frame.clone();
+        let pipelines = self.pipelines("frame", &[FRAME_FORMAT]);
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
         let FrameTarget { color_view, depth, .. } = target;
         let target = Target { color: &[color_view], depth, pipelines: &pipelines };
@@ -364,8 +364,14 @@ impl<'g, 's> Renderer<'g, 's> {
     }
 
     /// Pipelines whose fragment shaders are `mesh_NAME` and `sky_NAME`.
-    pub(crate) fn pipelines(&self, name: &str, formats: &[TextureFormat]) -> [RenderPipeline; 2] {
-        pipelines(self.gpu, &self.shader, &self.layout, name, formats)
+    pub(crate) fn pipelines(
+        &mut self,
+        name: &'static str,
+        formats: &[TextureFormat],
+    ) -> [RenderPipeline; 2] {
+        let Self { gpu, shader, layout, pictures, .. } = self;
+        let made = || pipelines(gpu, shader, layout, name, formats);
+        pictures.entry(name).or_insert_with(made).clone()
     }
 
     /// Draws the scene and the sky. One picture a submission, as they share buffers.
@@ -479,18 +485,6 @@ pub(crate) struct Target<'a> {
     pub(crate) depth: &'a TextureView,
     /// For meshes and for the sky.
     pub(crate) pipelines: &'a [RenderPipeline; 2],
-}
-
-struct CasterPipelines<'a> {
-    opaque: &'a MeshCasters,
-    masked: &'a MeshCasters,
-}
-
-impl CasterPipelines<'_> {
-    fn set(&self, pass: &mut RenderPass<'_>, is_masked: bool) {
-        let casters = if is_masked { self.masked } else { self.opaque };
-        pass.set_pipeline(casters.pipeline());
-    }
 }
 
 /// Draws meshes into a pass, with vertex buffers set once.

@@ -103,9 +103,6 @@ impl Prefiltering {
         prefilter: &Prefilter,
         depths: &DepthTexture,
     ) -> Result<Self, Error> {
-        prefilter
-            .check()
-            .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
         let statistic = &prefilter.statistic;
         check(statistic, support)?;
         let format = format(statistic);

@@ -182,12 +182,23 @@ impl Shadows {
     /// # Errors
     /// A filter that is out of its range.
     pub fn new(device: &Device, support: Support, options: &ShadowOptions) -> Result<Self, Error> {
-        if let Filter::Pcf { n } = options.filter {
-            Filter::pcf(n)
-                .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
+        options
+            .filter
+            .check()
+            .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
+        let is_spread = matches!(options.filter, Filter::Spread { .. });
+        if is_spread && !support.depth_fetch {
+            return Err(Error::Unsupported {
+                what: "fetching of depths",
+                why: "by which this filter compares them: take pcf without a width",
+            });
         }
-        let comparison =
-            if support.depth_fetch { options.comparison } else { Comparison::Hardware };
+        let comparison = match options.comparison {
+            // Its places are single texels.
+            _ if is_spread => Comparison::PerTexel,
+            _ if !support.depth_fetch => Comparison::Hardware,
+            comparison => comparison,
+        };
         let options = ShadowOptions { comparison, ..*options };
         let filter_mode = match (comparison, options.filter) {
             (Comparison::Hardware, Filter::Pcf { .. }) | (_, Filter::Prefiltered(_)) => {

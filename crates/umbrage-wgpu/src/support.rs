@@ -122,6 +122,23 @@ impl Support {
         })
     }
 
+    /// A device that can do all, for tests.
+    #[cfg(test)]
+    pub(crate) const FULL: Self = Self {
+        depth_clip_control: true,
+        storage_buffers: true,
+        depth_fetch: true,
+        float32: true,
+        norm16: true,
+        snorm8: true,
+        max_attachments: 8,
+        max_attachment_bytes: 32,
+        max_side: 8192,
+        max_layers: 256,
+        any_layers: true,
+        uniform_alignment: 256,
+    };
+
     /// How many layers an array texture gets that needs so many.
     pub(crate) fn array_layers(&self, needed: u32) -> u32 {
         let needed = needed.max(1);

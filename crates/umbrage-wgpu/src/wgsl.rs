@@ -57,7 +57,10 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
             .replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string())
             .replace("{GUTTER}", &number(filter.reach_texels() as f32))
             .replace("{WIDTH}", &metres(width)),
-        Filter::Pcf { n } => pcf.replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string()),
+        Filter::Pcf { n } => {
+            let n = n.clamp(1, Filter::MAX_PCF).to_string();
+            include_str!("wgsl/pcf_weight.wgsl").replace("{N}", &n) + pcf
+        }
         _ => hard.to_owned(),
     }
 }
@@ -74,7 +77,7 @@ fn prefiltered(prefilter: &Prefilter, layout: Layout) -> String {
         Blur::Texels(_) => include_str!("wgsl/footprint_texels.wgsl")
             .replace("{VARIANCE}", &number(prefilter.variance_texels() as f32)),
         Blur::Width(width) => include_str!("wgsl/footprint_width.wgsl")
-            .replace("{DEVIATION}", &number(Prefilter::deviation() as f32))
+            .replace("{DEVIATION}", &number(Prefilter::DEVIATION as f32))
             .replace("{WIDTH}", &metres(width))
             .replace("{LAST_LEVEL}", &number((prefilter.levels() - 1) as f32)),
     };
@@ -235,21 +238,6 @@ mod tests {
     use std::mem::{offset_of, size_of};
     use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Vsm};
 
-    const SUPPORT: Support = Support {
-        depth_clip_control: true,
-        storage_buffers: true,
-        depth_fetch: true,
-        float32: true,
-        norm16: true,
-        snorm8: true,
-        max_attachments: 8,
-        max_attachment_bytes: 32,
-        max_side: 8192,
-        max_layers: 256,
-        any_layers: true,
-        uniform_alignment: 256,
-    };
-
     fn validated(text: &str) -> (naga::Module, ModuleInfo) {
         let module = naga::front::wgsl::parse_str(text)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
@@ -336,7 +324,7 @@ mod tests {
     #[test]
     fn every_caster_module_is_valid() {
         for depth_clip_control in [true, false] {
-            let support = Support { depth_clip_control, ..SUPPORT };
+            let support = Support { depth_clip_control, ..Support::FULL };
             for is_masked in [true, false] {
                 let (module, _) = validated(&mesh(&support, is_masked));
                 let has_fragment = is_masked || !depth_clip_control;
@@ -408,7 +396,7 @@ mod tests {
                 index
             ]
         );
-        let (module, _) = validated(&mesh(&SUPPORT, true));
+        let (module, _) = validated(&mesh(&Support::FULL, true));
         check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
         let text = prefilter(
             &Prefilter { statistic: statistics()[0], blur: Blur::Texels(3) },

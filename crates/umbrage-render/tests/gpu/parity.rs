@@ -140,17 +140,22 @@ fn check(name: &str, technique: &str, filter: Filter, d: &Difference) {
 fn agrees(name: &str, techniques: &[(&str, Options)]) {
     let scene = scene(name);
     let set = Set::new(&scene, IMAGE);
-    let light = set.light();
     for (i, (technique, options)) in techniques.iter().enumerate() {
         let filter = if i % 2 == 0 { Filter::Hard } else { Filter::Pcf { n: 3 } };
-        let plan = set.plan(&[light], options);
-        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
-        let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
-        let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
-        let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
-        let difference = compare(&set, &plan, (0, &light), filter, &samples, &reference);
-        check(name, technique, filter, &difference);
+        agrees_with(name, &set, technique, options, filter);
     }
+}
+
+/// One technique and filter in a scene's own light.
+fn agrees_with(name: &str, set: &Set<'_>, technique: &str, options: &Options, filter: Filter) {
+    let light = set.light();
+    let plan = set.plan(&[light], options);
+    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
+    let samples = draw(set, &plan, &look, &shadow_options, GPU.support());
+    let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
+    let difference = compare(set, &plan, (0, &light), filter, &samples, &reference);
+    check(name, technique, filter, &difference);
 }
 
 /// Those of [`techniques`] with these indices: every scene has some, every technique two scenes at least.
@@ -269,17 +274,10 @@ fn every_prefilter_in_four_scenes() {
     for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
-        let light = set.light();
-        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
         for (i, statistic) in statistics.into_iter().enumerate() {
             let (technique, options) = techniques()[[1, 4, 7][i % 3]];
-            let plan = set.plan(&[light], &options);
             let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5) });
-            let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
-            let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
-            let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
-            let difference = compare(&set, &plan, (0, &light), filter, &samples, &reference);
-            check(name, technique, filter, &difference);
+            agrees_with(name, &set, technique, &options, filter);
         }
     }
 }
@@ -293,8 +291,6 @@ fn every_width_in_four_scenes() {
     for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
-        let light = set.light();
-        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
         let filters = [
             Filter::Spread { n: 5, width: Width::Pixels(3.0) },
             Filter::Spread { n: 4, width: Width::Metres(0.5) },
@@ -305,12 +301,7 @@ fn every_width_in_four_scenes() {
         ];
         for (i, filter) in filters.into_iter().enumerate() {
             let (technique, options) = techniques()[[1, 4, 7][i % 3]];
-            let plan = set.plan(&[light], &options);
-            let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
-            let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
-            let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
-            let difference = compare(&set, &plan, (0, &light), filter, &samples, &reference);
-            check(name, technique, filter, &difference);
+            agrees_with(name, &set, technique, &options, filter);
         }
     }
 }

@@ -1,14 +1,5 @@
 // Percentage-closer filtering over an exact box of N × N texels, by bilinear comparisons placed so that their weights
 // are the box's.
-const SHADOW_PCF: i32 = {N};
-
-fn shadow_pcf_weight(k: i32, fraction: f32) -> f32 {
-    if (k == 0) {
-        return 1.0 - fraction;
-    }
-    return select(select(0.0, fraction, k == SHADOW_PCF), 1.0, k < SHADOW_PCF);
-}
-
 fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let start = receiver.texel - 0.5 * f32(SHADOW_PCF);
     let first = floor(start);

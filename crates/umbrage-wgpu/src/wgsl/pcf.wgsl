@@ -1,15 +1,6 @@
 // Percentage-closer filtering (Reeves, Salesin and Cook 1987): the share of lit texels in a box of N × N texels. The
 // box is exact, so (N + 1)² texels count, four of which are fetched at a time; each is compared with the depth of
 // the receiver's own plane there.
-const SHADOW_PCF: i32 = {N};
-
-fn shadow_pcf_weight(k: i32, fraction: f32) -> f32 {
-    if (k == 0) {
-        return 1.0 - fraction;
-    }
-    return select(select(0.0, fraction, k == SHADOW_PCF), 1.0, k < SHADOW_PCF);
-}
-
 fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let start = receiver.texel - 0.5 * f32(SHADOW_PCF);
     let first = floor(start);

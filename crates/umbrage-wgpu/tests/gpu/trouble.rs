@@ -3,7 +3,8 @@
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
-use umbrage::visibility::Filter;
+use umbrage::visibility::statistic::{Statistic, Vsm};
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 use umbrage::{Faces, Options, Partition, Size, Warp};
 use umbrage_wgpu::{
     Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
@@ -26,6 +27,14 @@ fn input_that_makes_no_sense_is_named() {
     let new = |options: &ShadowOptions| Shadows::new(&bench.device, bench.support, options);
     let error = new(&ShadowOptions { filter: Filter::Pcf { n: 99 }, ..Default::default() });
     assert!(error.unwrap_err().to_string().starts_with("options.filter"));
+    let width = Width::Metres(f32::NAN);
+    let spread =
+        new(&ShadowOptions { filter: Filter::Spread { n: 3, width }, ..Default::default() });
+    assert!(spread.unwrap_err().to_string().starts_with("options.filter: filter.width"));
+    let statistic = Statistic::Vsm(Vsm { leak: 2.0 });
+    let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3) });
+    let leaky = new(&ShadowOptions { filter, ..Default::default() });
+    assert!(leaky.unwrap_err().to_string().starts_with("options.filter: filter.leak"));
     let mut shadows = new(&ShadowOptions::default()).unwrap();
     for bias in [
         Bias { texels: f32::NAN, metres: 0.0 },
@@ -42,6 +51,30 @@ fn input_that_makes_no_sense_is_named() {
     assert_eq!(error, Error::LogarithmicRows { map: 0 });
     // And all is as it was.
     prepare(&bench, &mut shadows, &small, DVec3::ZERO).unwrap();
+}
+
+#[test]
+fn filters_that_a_device_cannot_have_are_named() {
+    let bench = bench();
+    let lacking = [
+        (Support { depth_fetch: false, ..bench.support }, spread(), "fetching of depths"),
+        (Support { float32: false, ..bench.support }, vsm(), "filtering of 32-bit floats"),
+    ];
+    for (support, filter, expected) in lacking {
+        let options = ShadowOptions { filter, ..ShadowOptions::default() };
+        let error = Shadows::new(&bench.device, support, &options).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+fn spread() -> Filter {
+    Filter::Spread { n: 3, width: Width::Pixels(2.0) }
+}
+
+fn vsm() -> Filter {
+    let statistic = Statistic::Vsm(Vsm::default());
+    Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3) })
 }
 
 #[test]

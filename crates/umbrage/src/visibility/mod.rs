@@ -25,7 +25,6 @@
 //! a texel (Lauritzen 2008, GPU Gems 3, §8.4.2) gives 0.0098, and lets light through where
 //! surfaces are steep to it; the smaller of the two 0.0089; half of h 0.0087. Most of what is left is
 //! the texels' stair-steps.
-
 //!
 //! # Filters that are applied ahead of lookup
 //!

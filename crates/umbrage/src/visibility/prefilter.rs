@@ -23,9 +23,6 @@ pub enum Blur {
     Width(Width),
 }
 
-/// A Gaussian's standard deviation as a share of its width.
-const DEVIATION: f64 = 0.25;
-
 /// Standard deviation of what a level's sample averages over, as a share of its texel: the box that made it, and the interpolation
 /// between texels.
 const SAMPLE_DEVIATION: f64 = 0.5;
@@ -76,6 +73,9 @@ impl Footprint {
 }
 
 impl Prefilter {
+    /// A Gaussian's standard deviation as a share of its width.
+    pub const DEVIATION: f64 = 0.25;
+
     /// The widest blur, texels.
     pub const MAX_BLUR: u32 = 63;
 
@@ -131,7 +131,7 @@ impl Prefilter {
     /// to 1.
     pub fn weights(&self) -> impl Iterator<Item = f32> + Clone + use<> {
         let radius = self.radius_texels();
-        let deviation = DEVIATION * f64::from(2 * radius + 1);
+        let deviation = Self::DEVIATION * f64::from(2 * radius + 1);
         let gaussian = move |k: u32| (-0.5 * (f64::from(k) / deviation).powi(2)).exp();
         let sum = 1.0 + 2.0 * (1..=radius).map(gaussian).sum::<f64>();
         (0..=radius).map(move |k| (gaussian(k) / sum) as f32)
@@ -149,11 +149,6 @@ impl Prefilter {
         blur + 1.0 / 6.0
     }
 
-    /// Standard deviation of a filter that knows the warp, as a share of its width.
-    pub const fn deviation() -> f64 {
-        DEVIATION
-    }
-
     /// Where to sample for a receiver.
     pub fn footprint(&self, receiver: &Receiver) -> Footprint {
         let Blur::Width(width) = self.blur else {
@@ -165,7 +160,7 @@ impl Prefilter {
                 covariance: [variance, variance, 0.0],
             };
         };
-        let deviation = DEVIATION * width.metres(receiver);
+        let deviation = Self::DEVIATION * width.metres(receiver);
         let [ss, tt, st] = receiver.texel_metric.map(|m| m * deviation * deviation);
         let mean = 0.5 * (ss + tt);
         let spread = (0.5 * (ss - tt)).hypot(st);
