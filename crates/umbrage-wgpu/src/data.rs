@@ -5,7 +5,7 @@ use crate::{Bias, Error, Support};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, DVec4, Mat4, Vec4};
 use umbrage::visibility::Filter;
-use umbrage::{Place, Plan, ShadowMap};
+use umbrage::{Place, Plan, ShadowMap, Slab};
 
 /// `ShadowSettings`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -39,6 +39,7 @@ pub(crate) struct Map {
     pub(crate) w: Vec4,
     pub(crate) fade_from: Vec4,
     pub(crate) beam_scale: Vec4,
+    pub(crate) slab: Vec4,
     pub(crate) size: [f32; 2],
     pub(crate) origin: [f32; 2],
     pub(crate) layer: u32,
@@ -152,6 +153,7 @@ impl Map {
             // Nothing lies on the negative side of the plane that is at infinity.
             fade_from: map.fade_from.map_or(Vec4::W, plane),
             beam_scale: beam_scale(map),
+            slab: slab(map),
             size: place.size.map(|n| n as f32),
             origin: place.origin.map(|n| n as f32),
             layer: place.layer,
@@ -167,6 +169,7 @@ impl Map {
 #[repr(C)]
 pub(crate) struct PrefilterMap {
     pub(crate) beam_scale: Vec4,
+    pub(crate) slab: Vec4,
     pub(crate) origin: [f32; 2],
     pub(crate) low: [i32; 2],
     pub(crate) high: [i32; 2],
@@ -182,6 +185,7 @@ impl PrefilterMap {
         let high = [0, 1].map(|i| low[i] + drawn[i] as i32 - 1);
         Self {
             beam_scale: beam_scale(map),
+            slab: slab(map),
             origin: place.origin.map(|n| n as f32),
             low,
             high,
@@ -196,6 +200,13 @@ fn beam_scale(map: &ShadowMap) -> Vec4 {
     let w = map.local_from_shadow.row(3);
     let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
     DVec4::new(w.x / width, w.y / height, w.z, w.w).as_vec4()
+}
+
+/// Growth of the slab's near side per texel in s and t, its near side at texel 0, and one over its thickness.
+fn slab(map: &ShadowMap) -> Vec4 {
+    let Slab { slope, begin, thickness } = map.slab;
+    let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
+    DVec4::new(slope.x / width, slope.y / height, begin, 1.0 / thickness).as_vec4()
 }
 
 /// From render space to a map's local space.

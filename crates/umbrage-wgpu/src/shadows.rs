@@ -8,7 +8,7 @@ use glam::{DMat4, DVec3};
 use std::mem::size_of;
 use std::num::NonZeroU64;
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap};
+use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
@@ -148,6 +148,7 @@ pub(crate) struct Record {
     pub(crate) clip_from_render: DMat4,
     shadow_from_local: DMat4,
     origin: DVec3,
+    slab: Slab,
     caster_planes: Vec<Plane>,
 }
 
@@ -158,6 +159,7 @@ impl Record {
             && self.place == place
             && self.shadow_from_local == map.shadow_from_local
             && self.origin == map.origin
+            && self.slab == map.slab
             && self.caster_planes == map.caster_planes
     }
 
@@ -171,6 +173,7 @@ impl Record {
         self.place = place;
         self.shadow_from_local = map.shadow_from_local;
         self.origin = map.origin;
+        self.slab = map.slab;
         self.caster_planes.clear();
         self.caster_planes.extend_from_slice(&map.caster_planes);
     }

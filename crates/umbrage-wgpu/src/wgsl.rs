@@ -388,6 +388,7 @@ mod tests {
                 w,
                 fade_from,
                 beam_scale,
+                slab,
                 size,
                 origin,
                 layer,
@@ -407,6 +408,7 @@ mod tests {
         let (members, span) = layout(&own, "ShadowPrefilterMap");
         let ours = [
             offset_of!(data::PrefilterMap, beam_scale),
+            offset_of!(data::PrefilterMap, slab),
             offset_of!(data::PrefilterMap, origin),
             offset_of!(data::PrefilterMap, low),
             offset_of!(data::PrefilterMap, high),

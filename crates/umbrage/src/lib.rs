@@ -44,6 +44,7 @@ mod partition;
 mod plan;
 mod planner;
 mod resolution;
+mod slab;
 mod stable;
 pub mod theory;
 pub mod visibility;
@@ -57,7 +58,7 @@ pub use error::Error;
 pub use light::{Light, PointLight, SpotLight};
 pub use options::{Faces, Objective, Options, Partition, Size, Splits, Warp};
 pub use plan::{
-    Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap,
+    Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
 };
 pub use planner::Planner;
 

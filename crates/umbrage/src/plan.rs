@@ -193,6 +193,28 @@ pub struct ShadowMap {
     pub apex: Option<DVec3>,
     /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
     pub pixel_gradient: DVec3,
+    /// Where the receivers served lie in [linear depth](Self::linear_depth).
+    pub slab: Slab,
+}
+
+/// What lies between two parallel planes over (s, t): a range of [linear depth](ShadowMap::linear_depth) that follows the ground, and is many times
+/// smaller than the map's own where light falls at a slant. What filters store in place of depth counts from here, so that they spend their digits and
+/// their terms where shadows fall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    /// Growth of depth at its near side per unit of s and t.
+    pub slope: DVec2,
+    /// Depth of its near side at s = t = 0.
+    pub begin: f64,
+    /// Depth from its near to its far side, > 0.
+    pub thickness: f64,
+}
+
+/// All of a map's depths.
+impl Default for Slab {
+    fn default() -> Self {
+        Self { slope: DVec2::ZERO, begin: 0.0, thickness: 1.0 }
+    }
 }
 
 /// The line of points that one (s, t) stands for, in world space, running away from the light.
@@ -261,6 +283,26 @@ impl ShadowMap {
         let [begin, step] = self.beam_scale(st);
         let end = begin + step;
         if begin > 0.0 && end > 0.0 { depth * end / (begin + step * depth) } else { depth }
+    }
+
+    /// [Linear depth](Self::linear_depth) in the [slab](Self::slab) of the receivers: 0 at its near side and 1 at its far side.
+    pub fn slab_depth(&self, st: DVec2, depth: f64) -> f64 {
+        let Slab { slope, begin, thickness } = self.slab;
+        (self.linear_depth(st, depth) - begin - slope.dot(st)) / thickness
+    }
+
+    /// How slab depth changes along a surface of this slope, ∂depth/∂(s, t), per unit of s and t.
+    pub(crate) fn slab_slope(&self, st: DVec2, depth: f64, slope: DVec2) -> DVec2 {
+        let [begin, step] = self.beam_scale(st);
+        let (end, here) = (begin + step, begin + step * depth);
+        let mut linear = slope;
+        if begin > 0.0 && end > 0.0 {
+            let w = self.local_from_shadow.row(3);
+            // Of depth · end/here, with respect to depth and to the beam.
+            linear = slope * (begin * end / (here * here))
+                + DVec2::new(w.x, w.y) * (depth * step * (depth - 1.0) / (here * here));
+        }
+        (linear - self.slab.slope) / self.slab.thickness
     }
 
     /// The fourth coordinate of the points of a beam: where depth is 0, and its growth to where depth is 1.

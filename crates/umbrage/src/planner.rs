@@ -9,8 +9,9 @@ use crate::light::{Lamp, Light};
 use crate::math::range;
 use crate::options::{Faces, Objective, Options, Size, Warp};
 use crate::partition::{self, Along};
-use crate::plan::{Face, MapError, Part, Plan, PlannedLight, Rows, ShadowMap};
+use crate::plan::{Face, MapError, Part, Plan, PlannedLight, Rows, ShadowMap, Slab};
 use crate::resolution::{enlarged, resolutions};
+use crate::slab::slab;
 use crate::stable::{Still, bounding_sphere};
 use crate::warp::{LightSpace, OnePoint, Seen, psm, theta};
 use crate::worst::{self, worst_errors};
@@ -286,6 +287,7 @@ struct Scratch {
     covered: Vec<Seen>,
     outline: Vec<DVec2>,
     worst: worst::Scratch,
+    points: Vec<DVec3>,
 }
 
 impl Scratch {
@@ -402,6 +404,10 @@ impl Scratch {
         }
         if draft.still.is_none() {
             map.begin_earlier(MARGIN_TEXELS * texel_depth(map, &draft.body));
+            // A map of the whole scene stays as it is whatever is seen of it.
+            if options.warp != Warp::Unfocused {
+                map.slab = slab(map, &draft.body, &mut self.points);
+            }
         }
         let height = f64::from(camera.image()[1]);
         map.storage_factor =
@@ -429,6 +435,7 @@ impl Default for ShadowMap {
             caster_planes: Vec::new(),
             apex: None,
             pixel_gradient: DVec3::ZERO,
+            slab: Slab::default(),
         }
     }
 }

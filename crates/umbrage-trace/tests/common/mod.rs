@@ -137,6 +137,7 @@ pub(crate) fn even_map(
         caster_planes: Vec::new(),
         apex: None,
         pixel_gradient: DVec3::ZERO,
+        slab: umbrage::Slab::default(),
     }
 }
 

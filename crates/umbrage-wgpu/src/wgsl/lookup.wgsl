@@ -40,6 +40,8 @@ struct ShadowMap {
     fade_from: vec4f,
     // See `shadow_linear_depth`.
     beam_scale: vec4f,
+    // See `shadow_slab_depth`.
+    slab: vec4f,
     // Texels of the map, and of the texture at which it begins.
     size: vec2f,
     origin: vec2f,

@@ -2,6 +2,7 @@
 
 struct ShadowPrefilterMap {
     beam_scale: vec4f,
+    slab: vec4f,
     // Where the map begins in the texture, and what may be read: the map with its gutter.
     origin: vec2f,
     low: vec2i,
@@ -32,8 +33,8 @@ fn shadow_prefilter_vertex(@builtin(vertex_index) index: u32) -> @builtin(positi
 fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered {
     let depth = textureLoad(shadow_prefilter_depths, vec2i(at.xy), 0);
     let texel = at.xy - shadow_prefilter_map.origin;
-    let linear = shadow_linear_depth(shadow_prefilter_map.beam_scale, texel, depth);
-    let numbers = shadow_encode(clamp(linear, 0.0, 1.0));
+    let in_slab = shadow_slab_depth(shadow_prefilter_map.beam_scale, shadow_prefilter_map.slab, texel, depth);
+    let numbers = shadow_encode(clamp(in_slab, 0.0, 1.0));
     return ShadowPrefiltered({VALUES});
 }
 //ELSE

@@ -35,11 +35,13 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
         numbers[i] /= weights;
     }
     // How much the receiver's own plane varies over the filter, as far as the numbers cannot tell it from occluders.
-    let slope = receiver.slope;
+    let beam_scale = shadow_maps[map].beam_scale;
+    let slab = shadow_maps[map].slab;
+    let expected = min(receiver.depth, 1.0) - receiver.slack;
+    let slope = shadow_slab_slope(beam_scale, slab, receiver.texel, expected, receiver.slope);
     let variance = footprint.covariance.x * slope.x * slope.x + footprint.covariance.y * slope.y * slope.y
         + 2.0 * footprint.covariance.z * slope.x * slope.y;
     let plane = {PLANE_DEVIATIONS} * sqrt(max(variance, 0.0));
-    let expected = min(receiver.depth, 1.0) - receiver.slack - plane;
-    let depth = shadow_linear_depth(shadow_maps[map].beam_scale, receiver.texel, expected);
+    let depth = shadow_slab_depth(beam_scale, slab, receiver.texel, expected) - plane;
     return clamp(shadow_reconstruct(numbers, depth), 0.0, 1.0);
 }

@@ -192,7 +192,7 @@ impl Prefilter {
         let [width, height] = map.resolution.map(f64::from);
         let t = map.rows.t_from_row((f64::from(j) + 0.5) / height);
         let st = DVec2::new((f64::from(i) + 0.5) / width, t);
-        self.statistic.encode(map.linear_depth(st, f64::from(depth)).clamp(0.0, 1.0) as f32)
+        self.statistic.encode(map.slab_depth(st, f64::from(depth)).clamp(0.0, 1.0) as f32)
     }
 
     /// What a filtered map has at a point in texel coordinates, computed there and then from the depths around, and never stored.
@@ -262,15 +262,17 @@ impl Prefilter {
         channels: &Channels,
     ) -> f32 {
         let [width, height] = map.resolution.map(f64::from);
+        let expected = receiver.depth.min(1.0) - receiver.half_texel;
         // Edge-on to the light the slope has no end: 8 in a texel is as good as infinite where all of depth is 1.
-        let slope = receiver.slope / DVec2::new(width, height);
-        let slope = slope.clamp(DVec2::splat(-8.0), DVec2::splat(8.0));
+        let texels = DVec2::new(width, height);
+        let steepest = 8.0 * texels;
+        let slope = receiver.slope.clamp(-steepest, steepest);
+        let slope = map.slab_slope(receiver.st, expected, slope) / texels;
         let [ss, tt, st] = footprint.covariance;
         let variance =
             ss * slope.x * slope.x + tt * slope.y * slope.y + 2.0 * st * slope.x * slope.y;
         let plane = f64::from(self.statistic.plane_deviations()) * variance.max(0.0).sqrt();
-        let expected = receiver.depth.min(1.0) - receiver.half_texel - plane;
-        let depth = map.linear_depth(receiver.st, expected);
+        let depth = map.slab_depth(receiver.st, expected) - plane;
         self.statistic.visibility(channels, depth as f32)
     }
 }

@@ -1,8 +1,8 @@
 //! Statistics of depth that can be filtered ahead of lookup: what they store, and what they make of it.
 //!
 //! A comparison cannot be filtered before the receiver is known. So each of these stores, in place of depth, numbers whose *means* over many
-//! texels tell how much light a receiver at any depth gets. Depth is linear along the beam, 0 to 1 over the map's own range
-//! ([`ShadowMap::linear_depth`](crate::ShadowMap::linear_depth)).
+//! texels tell how much light a receiver at any depth gets. Depth is linear along the beam, 0 to 1 over the slab in which the map's receivers lie
+//! ([`ShadowMap::slab_depth`](crate::ShadowMap::slab_depth)).
 //!
 //! | | stores | tells |
 //! | --- | --- | --- |

@@ -1,0 +1,134 @@
+//! The slab that receivers lie in.
+
+use crate::aliasing::Local;
+use crate::focus::Body;
+use crate::math::range;
+use crate::plan::{ShadowMap, Slab};
+use glam::{DMat2, DVec2, DVec3};
+
+/// How many texels' widths, laid along the beam, lie between the slab's near side and the receivers: casters before it are taken to lie on it, and a receiver
+/// is to tell them from itself.
+const MARGIN_TEXELS: f64 = 4.0;
+
+/// The same as a share of the slab.
+const MARGIN_SHARE: f64 = 0.1;
+
+/// Thinner ones have too few of a depth buffer's digits.
+const LEAST_THICKNESS: f64 = 1.0 / 4096.0;
+
+/// The slab is at most so much thicker than the thinnest one.
+const TOLERANCE: f64 = 0.02;
+
+/// Steeper slabs are not looked for.
+const STEEPEST: f64 = 4.0;
+
+/// Around the corners of what a map serves. `points` is a buffer.
+pub(crate) fn slab(map: &ShadowMap, body: &Body, points: &mut Vec<DVec3>) -> Slab {
+    points.clear();
+    let mut texel: f64 = 0.0;
+    for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
+        let (st, depth) = (local.shadow.truncate(), local.shadow.z);
+        let linear = map.linear_depth(st, depth);
+        let before = depth - local.footprint().longest() * local.depth_per_metre;
+        texel = texel.max(linear - map.linear_depth(st, before));
+        points.push(st.extend(linear));
+    }
+    let slope = thinnest(points);
+    let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));
+    let thickness = far - near;
+    let margin = (MARGIN_TEXELS * texel).max(MARGIN_SHARE * thickness).max(LEAST_THICKNESS);
+    // Behind, nothing but rounding is to be allowed for.
+    let whole = margin + thickness + 1e-3 * (margin + thickness);
+    let slab = Slab { slope, begin: near - margin, thickness: whole };
+    let is_sound = slope.is_finite() && slab.begin.is_finite() && whole.is_finite();
+    if is_sound { slab } else { Slab::default() }
+}
+
+/// The growth per s and t of the planes between which points (s, t, depth) lie closest together: the ellipsoid method in two dimensions, which converges on
+/// any convex function from its subgradients alone.
+fn thinnest(points: &[DVec3]) -> DVec2 {
+    let mut slope = DVec2::ZERO;
+    let mut ellipse = DMat2::from_diagonal(DVec2::splat(STEEPEST * STEEPEST));
+    let mut best = (f64::INFINITY, slope);
+    for _ in 0..64 {
+        let mut near = (f64::INFINITY, DVec2::ZERO);
+        let mut far = (f64::NEG_INFINITY, DVec2::ZERO);
+        for p in points {
+            let st = p.truncate();
+            let depth = p.z - slope.dot(st);
+            if depth < near.0 {
+                near = (depth, st);
+            }
+            if depth > far.0 {
+                far = (depth, st);
+            }
+        }
+        let thickness = far.0 - near.0;
+        if thickness < best.0 {
+            best = (thickness, slope);
+        }
+        let gradient = near.1 - far.1;
+        let along = ellipse * gradient;
+        // By so much the thinnest one may be thinner.
+        let gap = gradient.dot(along).max(0.0).sqrt();
+        // NaN ends it as well.
+        let goes_on = gap > TOLERANCE * best.0 && gap > 0.1 * LEAST_THICKNESS;
+        if !goes_on {
+            break;
+        }
+        let along = along / gap;
+        slope -= along / 3.0;
+        let outer = DMat2::from_cols(along * along.x, along * along.y);
+        ellipse = (ellipse - outer * (2.0 / 3.0)) * (4.0 / 3.0);
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thinnest_slab_is_found() {
+        let mut seed = 1u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(seed >> 8) / f64::from(1 << 24)
+        };
+        for _ in 0..200 {
+            let lean = DVec2::new(random() - 0.5, random() - 0.5) * 2.0;
+            let thick = random().powi(3);
+            let points: Vec<DVec3> = (0..40)
+                .map(|_| {
+                    let st = DVec2::new(random(), random());
+                    st.extend(lean.dot(st) + thick * random())
+                })
+                .collect();
+            let thickness = |slope: DVec2| {
+                let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));
+                far - near
+            };
+            let found = thickness(thinnest(&points));
+            // Halving steps in all directions, down to where nothing gets better.
+            let (mut slope, mut step) = (lean, 0.5);
+            while step > 1e-5 {
+                let around = (0..16).map(|i| DVec2::from_angle(f64::from(i) * 0.393) * step + slope);
+                match around.min_by(|&a, &b| thickness(a).total_cmp(&thickness(b))) {
+                    Some(better) if thickness(better) < thickness(slope) => slope = better,
+                    _ => step *= 0.5,
+                }
+            }
+            let best = thickness(slope);
+            assert!(found <= best * (1.0 + TOLERANCE) + LEAST_THICKNESS, "{found} {best}");
+        }
+    }
+
+    #[test]
+    fn points_that_are_none_or_one_or_a_line_are_no_trouble() {
+        for points in [vec![], vec![DVec3::ONE], vec![DVec3::ZERO, DVec3::ONE, DVec3::splat(0.5)]] {
+            let slope = thinnest(&points);
+            let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));
+            assert!(slope.is_finite() && !(far - near > 0.01), "{points:?}: {slope}");
+        }
+    }
+}
