@@ -132,6 +132,7 @@ fn statistic(statistic: &Statistic) -> String {
                 .replace("{AMOUNTS}", &pairs.collect::<Vec<_>>().join(", "))
                 .replace("{SHIFT}", &number(s.shift() / s.shrink()))
                 .replace("{GAIN}", &number(s.gain()))
+                .replace("{LEAK}", &number(s.leak()))
         }
         // The core's list is open to it alone.
         _ => String::new(),

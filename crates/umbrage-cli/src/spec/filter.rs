@@ -142,15 +142,11 @@ fn blur(options: &[FilterOption]) -> Option<BlurWidth> {
 impl BlurredKind {
     /// Options that it does not have are not there.
     fn statistic(self, options: &[FilterOption]) -> Statistic {
-        let leak = options.iter().find_map(|o| match o {
-            FilterOption::Leak(leak) => Some(*leak as f32),
-            _ => None,
-        });
         let exponent = options.iter().find_map(|o| match o {
             FilterOption::Exponent(c) => Some(*c as f32),
             _ => None,
         });
-        let leak = leak.unwrap_or(0.0);
+        let leak = leak(options).unwrap_or(0.0);
         let evsm = |components| {
             let exponent = exponent.unwrap_or(Evsm::MAX_EXPONENT);
             Statistic::Evsm(Evsm { components, exponent, leak })
@@ -186,6 +182,13 @@ impl BlurredKind {
     }
 }
 
+fn leak(options: &[FilterOption]) -> Option<f32> {
+    options.iter().find_map(|o| match o {
+        FilterOption::Leak(leak) => Some(*leak as f32),
+        _ => None,
+    })
+}
+
 fn csm(order: u32, options: &[FilterOption]) -> Result<Statistic> {
     let has = |option: &FilterOption| options.contains(option);
     let attenuation = options.iter().find_map(|o| match o {
@@ -195,6 +198,9 @@ fn csm(order: u32, options: &[FilterOption]) -> Result<Statistic> {
     // Lit surfaces half dark are of no use; of the two cures doubling is wrong in fewer pixels.
     let [offset, scale] = [has(&FilterOption::Offset), has(&FilterOption::Scale)];
     let csm = Csm::new(order, attenuation.unwrap_or(0.0), offset, scale || !offset)?;
+    // The second swing of the series about 0, the first one above it, is 0.049 high before it is doubled.
+    let ringing = 0.05 * csm.gain();
+    let csm = csm.with_leak(leak(options).unwrap_or(ringing));
     Ok(Statistic::Csm(if has(&FilterOption::Bits(16)) { csm.in_16_bits() } else { csm }))
 }
 
@@ -234,7 +240,7 @@ impl FromStr for Filter {
             "evsm" => blurred(BlurredKind::Evsm),
             "msm" => blurred(BlurredKind::Msm),
             "csm" => {
-                let known = ["blur=N", "attenuation=A", "offset", "scale", "bits=16"];
+                let known = ["blur=N", "leak=L", "attenuation=A", "offset", "scale", "bits=16"];
                 Ok(Self::Csm(numbered(1..=16)?, parse_options(options, stem, &known)?))
             }
             _ => bail!(

@@ -1,4 +1,4 @@
-use super::{Channels, Encoding, Storage};
+use super::{Channels, Encoding, Storage, check_leak, without_leak};
 use crate::error::{Error, check};
 use crate::theory::FourierStep;
 use std::f32::consts::PI;
@@ -15,6 +15,7 @@ pub struct Csm {
     attenuation: f32,
     offset: bool,
     scale: bool,
+    leak: f32,
     storage: Storage,
     /// Follow from these: how much depth is shrunk, and the depth by which the series is evaluated nearer the light.
     shrink: f32,
@@ -47,6 +48,7 @@ impl Csm {
             attenuation,
             offset,
             scale,
+            leak: 0.0,
             storage: Storage::Snorm8,
             // Damped so much that it hardly is a step, the series would leave nothing.
             shrink: (1.0 - 2.0 * o).max(LEAST_SHRINK),
@@ -58,6 +60,17 @@ impl Csm {
     #[must_use]
     pub fn in_16_bits(self) -> Self {
         Self { storage: Storage::Snorm16, ..self }
+    }
+
+    /// What visibility is taken for shadow, 0 to less than 1: it hides the series' ringing.
+    #[must_use]
+    pub fn with_leak(self, leak: f32) -> Self {
+        Self { leak, ..self }
+    }
+
+    /// What visibility is taken for shadow.
+    pub fn leak(&self) -> f32 {
+        self.leak
     }
 
     /// M.
@@ -116,7 +129,7 @@ impl Encoding for Csm {
                 amount * (pair[0] * cos - pair[1] * sin)
             })
             .sum();
-        self.gain() * (0.5 + sum)
+        without_leak(self.gain() * (0.5 + sum), self.leak)
     }
 
     fn plane_deviations(&self) -> f32 {
@@ -124,7 +137,7 @@ impl Encoding for Csm {
     }
 
     fn check(&self) -> Result<(), Error> {
-        Ok(())
+        check_leak(self.leak)
     }
 }
 
