@@ -140,11 +140,11 @@ impl Texels for Filtered<'_> {
         map: &ShadowMap,
         prefilter: &Prefilter,
         texel: DVec2,
-        lod: f64,
+        level: u32,
     ) -> Channels {
         match self.statistics {
-            Some(statistics) => statistics.sample(texel, lod),
-            None => (|i, j| self.depths.texel(i, j)).statistics(map, prefilter, texel, lod),
+            Some(statistics) => statistics.sample(texel, level),
+            None => (|i, j| self.depths.texel(i, j)).statistics(map, prefilter, texel, level),
         }
     }
 }
@@ -200,10 +200,13 @@ impl<'a> Reference<'a> {
             self.maps.iter().map(stored).sum::<u64>() * u64::from(bytes_per_texel(self.filter));
         // A quarter, a sixteenth … of smaller and smaller copies.
         let levels = match self.filter {
-            Filter::Prefiltered(prefilter) => prefilter.levels(),
-            _ => 1,
+            Filter::Prefiltered(prefilter) => {
+                let first = prefilter.first_level();
+                first..first + prefilter.levels()
+            }
+            _ => 0..1,
         };
-        (0..levels).map(|level| texels >> (2 * level)).sum()
+        levels.map(|level| texels >> (2 * level)).sum()
     }
 
     /// The maps' depths, in the plan's order.

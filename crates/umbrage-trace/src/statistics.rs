@@ -12,6 +12,8 @@ use umbrage::visibility::statistic::{Channels, MAX_CHANNELS, Storage};
 pub(crate) struct StatisticMap {
     channels: usize,
     gutter: u32,
+    /// Of the first of the levels.
+    first_level: u32,
     /// Each of half the resolution of the one before.
     levels: Vec<Level>,
 }
@@ -34,19 +36,26 @@ impl StatisticMap {
         let channels = prefilter.statistic.channels();
         let resolution = depths.resolution();
         let (gutter, drawn) = depths.drawn();
+        let first_level = prefilter.first_level();
         if resolution.contains(&0) {
-            return Ok(Self { channels, gutter, levels: Vec::new() });
+            return Ok(Self { channels, gutter, first_level, levels: Vec::new() });
         }
-        let size = drawn.map(|n| n as usize);
+        // Texels of the map to each that is stored.
+        let step = 1 << first_level;
+        let size = drawn.map(|n| (n >> first_level) as usize);
         let row = size[0] * channels;
         let storage = prefilter.statistic.storage();
         let first = -(gutter as i32);
+        let share = 1.0 / (step * step) as f32;
         let mut texels = buffer(row, size[1], resolution)?;
         texels.par_chunks_mut(row).enumerate().for_each(|(y, row)| {
-            let j = first + y as i32;
-            for (texel, i) in row.chunks_exact_mut(channels).zip(first..) {
-                let encoded = prefilter.encode(map, i, j, depths.texel(i, j));
-                texel.iter_mut().zip(encoded).for_each(|(t, e)| *t = storage.stored(e));
+            let j = first + step * y as i32;
+            for (texel, i) in row.chunks_exact_mut(channels).zip((first..).step_by(step as usize)) {
+                for (i, j) in (0..step * step).map(|k| (i + k % step, j + k / step)) {
+                    let encoded = prefilter.encode(map, i, j, depths.texel(i, j));
+                    texel.iter_mut().zip(encoded).for_each(|(t, e)| *t += share * e);
+                }
+                texel.iter_mut().for_each(|t| *t = storage.stored(*t));
             }
         });
         let weights: Vec<f32> = prefilter.weights().collect();
@@ -74,24 +83,14 @@ impl StatisticMap {
             let next = levels[levels.len() - 1].halved(channels, storage, resolution)?;
             levels.push(next);
         }
-        Ok(Self { channels, gutter, levels })
+        Ok(Self { channels, gutter, first_level, levels })
     }
 
-    /// Between levels linearly, between texels bilinearly, in texel coordinates.
-    pub(crate) fn sample(&self, texel: DVec2, lod: f64) -> Channels {
-        let lower = lod.floor();
-        let at = |level: f64| {
-            let place = (texel + f64::from(self.gutter)) / level.exp2();
-            let level = self.levels.get(level as usize).or(self.levels.last());
-            level.map_or([0.0; MAX_CHANNELS], |l| l.sample(place, self.channels))
-        };
-        let mut sum = at(lower);
-        let fraction = (lod - lower) as f32;
-        if fraction > 0.0 {
-            let upper = at(lower + 1.0);
-            sum.iter_mut().zip(upper).for_each(|(s, u)| *s += fraction * (u - *s));
-        }
-        sum
+    /// Between texels bilinearly, in the map's texel coordinates, at a level.
+    pub(crate) fn sample(&self, texel: DVec2, level: u32) -> Channels {
+        let place = (texel + f64::from(self.gutter)) / f64::from(1u32 << level);
+        let level = self.levels.get((level - self.first_level) as usize).or(self.levels.last());
+        level.map_or([0.0; MAX_CHANNELS], |l| l.sample(place, self.channels))
     }
 }
 

@@ -16,7 +16,7 @@ const BLUR: Blur = Blur::Texels(7);
 /// What the blur itself lets through: its weights, over an exact comparison of each texel with the receiver's plane.
 fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
     let map = &plan.maps[0];
-    let kernel = Prefilter { statistic: Statistic::Vsm(Vsm::default()), blur: BLUR };
+    let kernel = Prefilter { statistic: Statistic::Vsm(Vsm::default()), blur: BLUR, half: false };
     let weights: Vec<f64> = kernel.weights().map(f64::from).collect();
     let weight = |k: i32| weights.get(k.unsigned_abs() as usize).copied().unwrap_or(0.0);
     let radius = kernel.radius_texels() as i32;
@@ -72,7 +72,7 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
         &nobody,
     );
     let of = |&statistic: &Statistic| {
-        let filter = Filter::Prefiltered(Prefilter { statistic, blur: BLUR });
+        let filter = Filter::Prefiltered(Prefilter { statistic, blur: BLUR, half: false });
         let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
         let visibility = band.map(|s| Some(reference.visibility(0, s)), &nobody);
         let mut sums = [(0.0, 0u32); 2];

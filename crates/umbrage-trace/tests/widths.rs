@@ -4,7 +4,8 @@ mod common;
 
 use common::{ground, nobody, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
-use umbrage::visibility::{Filter, Width};
+use umbrage::visibility::statistic::{Csm, Statistic};
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Partition, Planner, Size, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
@@ -26,8 +27,8 @@ fn camera() -> Camera {
     .unwrap()
 }
 
-/// How far apart, across the light, visibility passes 10% and 90% on the ground, at some distances along the edge.
-fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<(f64, f64)> {
+/// How far apart visibility passes 10% and 90% on the ground, at some distances along the edge: in metres across the light, and in pixels across the edge.
+fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
     let over = sheet(Vec3::new(-50.0, 3.0, -60.0), Vec3::Z * 120.0, Vec3::X * 50.0);
     let scene =
         scene(vec![ground(60.0), over], &[(0, DAffine3::IDENTITY), (1, DAffine3::IDENTITY)]);
@@ -57,27 +58,74 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<(f64, f64)> {
                 let first = (-500..500).map(|i| EDGE_X + f64::from(i) * step);
                 first.into_iter().find(|&x| lit(x, z) >= level).unwrap()
             };
-            // Across the light the ground is foreshortened.
-            let across = (passes(0.9) - passes(0.1)) * LIGHT.normalize().y.abs();
-            (20.0 - z, across)
+            let [begin, end] = [0.1, 0.9].map(passes);
+            let pixel = |x: f64, z: f64| camera.pixel(DVec3::new(x, 0.0, z)).unwrap();
+            let edge = (pixel(EDGE_X, z + 0.01) - pixel(EDGE_X, z - 0.01)).normalize();
+            Ramp {
+                distance: 20.0 - z,
+                // Across the light the ground is foreshortened.
+                metres: (end - begin) * LIGHT.normalize().y.abs(),
+                pixels: edge.perp_dot(pixel(end, z) - pixel(begin, z)).abs(),
+            }
         })
         .collect()
 }
 
+/// A penumbra.
+#[derive(Debug)]
+struct Ramp {
+    /// From the viewer, metres along the edge.
+    distance: f64,
+    metres: f64,
+    pixels: f64,
+}
+
+const TECHNIQUES: [(Warp, u32); 4] = [
+    (Warp::Uniform, 1),
+    (Warp::Lispsm, 1),
+    (Warp::Adaptive(Objective::Storage), 4),
+    (Warp::Psm, 1),
+];
+
+/// Linear in what it filters.
+fn csm(width: Width) -> Filter {
+    let statistic = Statistic::Csm(Csm::new(16, 0.0, true, false).unwrap());
+    Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width), half: false })
+}
+
+/// A Gaussian rises from 10% to 90% over so many standard deviations.
+const RISE: f64 = 2.0 * 1.2816;
+
 #[test]
-fn widths_are_as_told_everywhere() {
-    let techniques = [
-        (Warp::Uniform, 1),
-        (Warp::Lispsm, 1),
-        (Warp::Adaptive(Objective::Storage), 4),
-        (Warp::Psm, 1),
-    ];
+fn comparisons_are_as_wide_as_told_everywhere() {
     // A box rises from 10% to 90% over 0.8 of its width.
     let filter = Filter::Spread { n: 15, width: Width::Metres(1.2) };
-    for (warp, slices) in techniques {
-        for (distance, across) in ramps(filter, warp, slices) {
-            let ratio = across / (0.8 * 1.2);
-            assert!((ratio - 1.0).abs() < 0.2, "{warp:?} at {distance} m: {across}");
+    for (warp, slices) in TECHNIQUES {
+        for ramp in ramps(filter, warp, slices) {
+            let ratio = ramp.metres / (0.8 * 1.2);
+            assert!((ratio - 1.0).abs() < 0.2, "{warp:?}: {ramp:?}");
+        }
+    }
+}
+
+#[test]
+fn numbers_are_as_wide_as_told_everywhere() {
+    for (warp, slices) in TECHNIQUES {
+        for ramp in ramps(csm(Width::Metres(1.6)), warp, slices) {
+            let ratio = ramp.metres / (RISE * Prefilter::DEVIATION * 1.6);
+            assert!((ratio - 1.0).abs() < 0.2, "{warp:?}: {ramp:?}");
+        }
+    }
+}
+
+#[test]
+fn pixels_are_those_of_the_picture() {
+    for (warp, slices) in TECHNIQUES {
+        // Farther away the ground is seen at less than a sixteenth, and counts as if at that.
+        let ramps = ramps(csm(Width::Pixels(16.0)), warp, slices);
+        for ramp in ramps.into_iter().filter(|r| r.distance < 40.0) {
+            let ratio = ramp.pixels / (RISE * Prefilter::DEVIATION * 16.0);
+            assert!((ratio - 1.0).abs() < 0.2, "{warp:?}: {ramp:?}");
         }
     }
 }

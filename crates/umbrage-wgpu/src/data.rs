@@ -18,6 +18,7 @@ pub(crate) struct Settings {
     pub(crate) texture_scale: [f32; 2],
     pub(crate) padding_too: [f32; 2],
     pub(crate) pixel_gradient: Vec4,
+    pub(crate) eye: Vec4,
 }
 
 /// `ShadowLight`.
@@ -110,6 +111,7 @@ impl Lookup {
                 let gradient = map.pixel_gradient;
                 gradient.extend(gradient.dot(offset)).as_vec4()
             }),
+            eye: (plan.origin - placed.render_origin).extend(1.0).as_vec4(),
         };
     }
 
@@ -178,10 +180,16 @@ pub(crate) struct PrefilterMap {
 }
 
 impl PrefilterMap {
-    /// A map whose numbers take `textures` layers.
-    pub(crate) fn new(map: &ShadowMap, place: &Place, filter: &Filter, textures: u32) -> Self {
-        let low = place.origin.map(|n| n as i32 - filter.reach_texels() as i32);
-        let drawn = filter.drawn_texels(place.size);
+    /// A map whose numbers take `textures` layers, the largest of them at a level.
+    pub(crate) fn new(
+        map: &ShadowMap,
+        place: &Place,
+        filter: &Filter,
+        textures: u32,
+        level: u32,
+    ) -> Self {
+        let low = place.origin.map(|n| (n as i32 - filter.reach_texels() as i32) >> level);
+        let drawn = filter.drawn_texels(place.size).map(|n| n >> level);
         let high = [0, 1].map(|i| low[i] + drawn[i] as i32 - 1);
         Self {
             beam_scale: beam_scale(map),

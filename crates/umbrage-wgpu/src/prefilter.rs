@@ -30,6 +30,8 @@ pub(crate) struct Prefiltering {
     textures: u32,
     groups: Vec<Range<u32>>,
     format: TextureFormat,
+    /// Of what is stored, the map itself being level 0.
+    first_level: u32,
     levels: u32,
     is_blurred: bool,
     encode: Vec<RenderPipeline>,
@@ -129,13 +131,16 @@ impl Prefiltering {
             groups.iter().map(one).collect()
         };
         let is_blurred = prefilter.radius_texels() > 0;
+        let first_level = prefilter.first_level();
         let levels = prefilter.levels();
         let blur = |pass| if is_blurred { pipelines(pass) } else { Vec::new() };
         let stride = (size_of::<PrefilterMap>() as u32).next_multiple_of(support.uniform_alignment);
         let uniforms = uniforms(device, stride);
-        let numbers = Numbers::new(device, support, format, depths, textures, levels);
-        let scratch =
-            is_blurred.then(|| Numbers::new(device, support, format, depths, textures, 1));
+        let size = stored_size(depths, first_level);
+        let numbers =
+            |levels| Numbers::new(device, support, format, depths, size, textures, levels);
+        let scratch = is_blurred.then(|| numbers(1));
+        let numbers = numbers(levels);
         let bindings = Bindings::new(
             device,
             [&encode_layout, &blur_layout],
@@ -147,6 +152,7 @@ impl Prefiltering {
         Ok(Self {
             textures,
             format,
+            first_level,
             levels,
             is_blurred,
             halve: if levels > 1 { pipelines(PrefilterPass::Halve) } else { Vec::new() },
@@ -177,8 +183,10 @@ impl Prefiltering {
 
     /// Makes room for the maps of another depth texture.
     pub(crate) fn resize(&mut self, device: &Device, support: &Support, depths: &DepthTexture) {
-        let numbers =
-            |levels| Numbers::new(device, support, self.format, depths, self.textures, levels);
+        let size = stored_size(depths, self.first_level);
+        let numbers = |levels| {
+            Numbers::new(device, support, self.format, depths, size, self.textures, levels)
+        };
         self.scratch = self.is_blurred.then(|| numbers(1));
         self.numbers = numbers(self.levels);
         self.rebind(device, depths);
@@ -212,7 +220,8 @@ impl Prefiltering {
         let maps = plan.maps.iter().zip(records).zip(self.bytes.chunks_exact_mut(stride));
         for ((map, record), bytes) in maps {
             if let Some(place) = record.place {
-                let uniform = PrefilterMap::new(map, &place, filter, self.textures);
+                let uniform =
+                    PrefilterMap::new(map, &place, filter, self.textures, self.first_level);
                 bytes[..size_of::<PrefilterMap>()].copy_from_slice(bytemuck::bytes_of(&uniform));
             }
         }
@@ -264,13 +273,18 @@ impl Prefiltering {
                 });
                 pass.set_pipeline(pipeline);
                 for (map, place) in stale.clone() {
-                    aim_level(&mut pass, &place, filter, level);
+                    aim_level(&mut pass, &place, filter, self.first_level + level);
                     pass.set_bind_group(0, bindings, &[map as u32 * self.stride]);
                     pass.draw(0..3, 0..1);
                 }
             }
         }
     }
+}
+
+/// Texels of what is stored of depths, width and height.
+fn stored_size(depths: &DepthTexture, first_level: u32) -> [u32; 2] {
+    depths.size().map(|n| (n >> first_level).max(1))
 }
 
 fn attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
@@ -289,10 +303,10 @@ impl Numbers {
         support: &Support,
         format: TextureFormat,
         depths: &DepthTexture,
+        [width, height]: [u32; 2],
         textures: u32,
         levels: u32,
     ) -> Self {
-        let [width, height] = depths.size();
         // Very small textures have fewer levels than maps have copies; nothing is ever drawn into those.
         let levels = levels.min(width.max(height).max(1).ilog2() + 1);
         let layers = support.array_layers(textures * depths.layers.len() as u32);

@@ -13,9 +13,9 @@ use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d,
-    FilterMode, MipmapFilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor,
-    ShaderStages, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType,
-    TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+    FilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor, ShaderStages,
+    Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
+    TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
 /// Format of the depth texture.
@@ -213,10 +213,6 @@ impl Shadows {
             label: Some("shadow sampler"),
             mag_filter: filter_mode,
             min_filter: filter_mode,
-            mipmap_filter: match options.filter {
-                Filter::Prefiltered(_) => MipmapFilterMode::Linear,
-                _ => MipmapFilterMode::Nearest,
-            },
             // Lit is what is not nearer to the light than the limit.
             compare: compares(&options).then_some(CompareFunction::LessEqual),
             ..SamplerDescriptor::default()

@@ -140,7 +140,7 @@ mod tests {
     fn copies_of_half_the_size_keep_maps_apart() {
         let statistic = Statistic::Vsm(Vsm::default());
         let blur = Blur::Width(Width::Metres(1.0));
-        let filter = Filter::Prefiltered(Prefilter { statistic, blur });
+        let filter = Filter::Prefiltered(Prefilter { statistic, blur, half: false });
         let mut slots = Slots::default();
         let sizes = [[100, 201], [31, 77], [65, 33], [1, 1]];
         slots.place(&plan(&sizes), Layout::Atlas, &filter, &SUPPORT).unwrap();

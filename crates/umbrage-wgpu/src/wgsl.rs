@@ -3,7 +3,7 @@
 use crate::{Comparison, Layout, ShadowOptions, Support};
 use std::ops::Range;
 use umbrage::visibility::statistic::Statistic;
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
+use umbrage::visibility::{Blur, Filter, Footprint, Prefilter, Width};
 
 /// What a device without storage buffers can be told of: sizes of the uniform arrays.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -33,7 +33,8 @@ pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool)
         .replace("{PLANES}", &array(MAX_PLANES))
         .replace("{SAMPLER}", sampler)
         .replace("{TEXTURE}", texture);
-    let mut text = format!("{}\n{bindings}\n", include_str!("wgsl/lookup.wgsl"));
+    let lookup = include_str!("wgsl/lookup.wgsl").replace("{METRIC}", &metric(&filter));
+    let mut text = [&lookup, &bindings, include_str!("wgsl/width.wgsl"), ""].join("\n");
     if let Filter::Prefiltered(prefilter) = filter {
         return text + &prefiltered(&prefilter, layout);
     }
@@ -53,10 +54,9 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
         }
     };
     match filter {
-        Filter::Spread { n, width } => include_str!("wgsl/spread.wgsl")
+        Filter::Spread { n, .. } => include_str!("wgsl/spread.wgsl")
             .replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string())
-            .replace("{GUTTER}", &number(filter.reach_texels() as f32))
-            .replace("{WIDTH}", &metres(width)),
+            .replace("{GUTTER}", &number(filter.reach_texels() as f32)),
         Filter::Pcf { n } => {
             let n = n.clamp(1, Filter::MAX_PCF).to_string();
             include_str!("wgsl/pcf_weight.wgsl").replace("{N}", &n) + pcf
@@ -73,28 +73,54 @@ fn prefiltered(prefilter: &Prefilter, layout: Layout) -> String {
         Layout::Layers => format!("{textures}u * shadow_maps[map].layer"),
     };
     let filter = Filter::Prefiltered(*prefilter);
+    let first_level = prefilter.first_level().to_string();
+    let variance = Prefilter::DEVIATION * Prefilter::DEVIATION;
     let footprint = match prefilter.blur {
         Blur::Texels(_) => include_str!("wgsl/footprint_texels.wgsl")
             .replace("{VARIANCE}", &number(prefilter.variance_texels() as f32)),
-        Blur::Width(width) => include_str!("wgsl/footprint_width.wgsl")
-            .replace("{DEVIATION}", &number(Prefilter::DEVIATION as f32))
-            .replace("{WIDTH}", &metres(width))
-            .replace("{LAST_LEVEL}", &number((prefilter.levels() - 1) as f32)),
+        Blur::Width(_) => include_str!("wgsl/footprint_width.wgsl")
+            .replace("{VARIANCE}", &number(variance as f32))
+            .replace("{SAMPLE_VARIANCE}", &number(Footprint::SAMPLE_VARIANCE as f32))
+            .replace("{LEAST_VARIANCE}", &number(Footprint::LEAST_VARIANCE as f32))
+            .replace("{ANISOTROPY_SQUARED}", &number(Footprint::ANISOTROPY.powi(2) as f32))
+            .replace("{MAX_SAMPLES}", &number(Footprint::MAX_SAMPLES as f32))
+            .replace(
+                "{LAST_LEVEL}",
+                &(prefilter.first_level() + prefilter.levels() - 1).to_string(),
+            ),
     };
-    let lookup = include_str!("wgsl/prefiltered.wgsl")
+    let sample = |t: u32| {
+        format!("textureSampleLevel(shadow_depths, shadow_sampler, at, first + {t}u, lod)")
+    };
+    let samples = (0..textures).map(sample).collect::<Vec<_>>().join(", ");
+    let is_wide = matches!(prefilter.blur, Blur::Width(_));
+    let lookup = choose(include_str!("wgsl/prefiltered.wgsl"), &[("SEVERAL", is_wide)])
         .replace("{FIRST_LAYER}", &first)
+        .replace("{SAMPLES}", &samples)
         .replace("{TEXTURES}", &textures.to_string())
         .replace("{GUTTER}", &number(filter.reach_texels() as f32))
         .replace("{ALIGN}", &number(filter.align_texels() as f32))
         .replace("{PLANE_DEVIATIONS}", &number(prefilter.statistic.plane_deviations()));
-    [statistic(&prefilter.statistic), footprint, lookup].join("\n")
+    [statistic(&prefilter.statistic), footprint, lookup]
+        .join("\n")
+        .replace("{FIRST_LEVEL}", &first_level)
 }
 
-/// A width in metres, as an expression of the receiver.
-fn metres(width: Width) -> String {
+/// What a filter's width covers, as an expression of the point.
+fn metric(filter: &Filter) -> String {
+    let width = match filter {
+        Filter::Spread { width, .. } => Some(*width),
+        Filter::Prefiltered(Prefilter { blur: Blur::Width(width), .. }) => Some(*width),
+        _ => None,
+    };
     match width {
-        Width::Pixels(pixels) => format!("({pixels:?} * receiver.pixel_metres)"),
-        Width::Metres(metres) => number(metres),
+        Some(Width::Metres(metres)) => {
+            format!("shadow_metric(point.grad_s, point.grad_t) * {:?}", metres * metres)
+        }
+        Some(Width::Pixels(pixels)) => {
+            format!("shadow_pixel_metric(point, position, normal) * {:?}", pixels * pixels)
+        }
+        None => "vec3f(0.0)".to_owned(),
     }
 }
 
@@ -178,8 +204,9 @@ pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range
     });
     let text = choose(
         include_str!("wgsl/prefilter.wgsl"),
-        &[("ENCODE", is_encode), ("HALVE", pass == PrefilterPass::Halve)],
+        &[("ENCODE", is_encode), ("HALVE", pass == PrefilterPass::Halve), ("HALF", prefilter.half)],
     )
+    .replace("{TEXTURES}", &textures(&prefilter.statistic).to_string())
     .replace("{OUTPUTS}", &outputs)
     .replace("{VALUES}", &values)
     .replace("{DIRECTION}", direction)
@@ -270,11 +297,13 @@ mod tests {
         for statistic in statistics() {
             let blurs = [1, 3, 63].map(Blur::Texels);
             for blur in blurs.into_iter().chain([Blur::Width(Width::Metres(1.0))]) {
-                let filter = Prefilter { statistic, blur };
-                let all = textures(&statistic);
-                for range in [0..all, 0..1, all - 1..all] {
-                    for pass in PASSES {
-                        validated(&prefilter(&filter, pass, range.clone()));
+                for half in [false, true] {
+                    let filter = Prefilter { statistic, blur, half };
+                    let all = textures(&statistic);
+                    for range in [0..all, 0..1, all - 1..all] {
+                        for pass in PASSES {
+                            validated(&prefilter(&filter, pass, range.clone()));
+                        }
                     }
                 }
             }
@@ -294,7 +323,7 @@ mod tests {
         let prefiltered = statistics().into_iter().flat_map(|statistic| {
             let blurs =
                 [Blur::Texels(7), Blur::Width(Width::Metres(0.5)), Blur::Width(Width::Pixels(3.0))];
-            blurs.map(|blur| Filter::Prefiltered(Prefilter { statistic, blur }))
+            blurs.map(|blur| Filter::Prefiltered(Prefilter { statistic, blur, half: false }))
         });
         let widths = [Width::Metres(0.5), Width::Pixels(3.0)];
         let spread = widths.map(|width| Filter::Spread { n: 5, width });
@@ -375,7 +404,7 @@ mod tests {
             m,
             "ShadowSettings",
             data::Settings,
-            [bias_texels, bias_metres, light_count, texture_scale, pixel_gradient]
+            [bias_texels, bias_metres, light_count, texture_scale, pixel_gradient, eye]
         );
         check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, padding]);
         check_layout!(
@@ -401,7 +430,7 @@ mod tests {
         let (module, _) = validated(&mesh(&Support::FULL, true));
         check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
         let text = prefilter(
-            &Prefilter { statistic: statistics()[0], blur: Blur::Texels(3) },
+            &Prefilter { statistic: statistics()[0], blur: Blur::Texels(3), half: false },
             PrefilterPass::Rows,
             0..1,
         );

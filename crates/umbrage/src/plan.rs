@@ -244,8 +244,16 @@ pub struct Receiver {
     /// How texels lie across the light: squares of the texels to a metre in s and in t, and the product of the two
     /// directions (0 where they are perpendicular). A disc of radius r metres has r² times this for its covariance, but for a factor.
     pub texel_metric: [f64; 3],
-    /// Width of a pixel of the viewer's picture here, metres.
-    pub pixel_metres: f64,
+    /// The same of texels to a pixel of the viewer's picture, on the surface's plane: more where it is seen at a slant, up to 16 times.
+    pub pixel_metric: [f64; 3],
+}
+
+/// What is seen at a slant of less than this (the sine of it) counts as if at this one.
+const LEAST_SLANT: f64 = 1.0 / 16.0;
+
+/// Squares of two gradients, and their product.
+fn metric(s: DVec3, t: DVec3) -> [f64; 3] {
+    [s.length_squared(), t.length_squared(), s.dot(t)]
 }
 
 impl ShadowMap {
@@ -338,12 +346,21 @@ impl ShadowMap {
             depth: here.shadow.z,
             slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
             half_texel: 0.5 * here.footprint().longest() * here.depth_per_metre,
-            texel_metric: [
-                here.grad_s.length_squared(),
-                here.grad_t.length_squared(),
-                here.grad_s.dot(here.grad_t),
-            ],
-            pixel_metres: self.pixel_gradient.dot(local).max(0.0),
+            texel_metric: metric(here.grad_s, here.grad_t),
+            pixel_metric: {
+                // Along the surface's plane a step across the view goes on along it.
+                let view = local.normalize_or_zero();
+                let slant = world_normal.dot(view);
+                let slant = slant.signum() * slant.abs().max(LEAST_SLANT);
+                let on_plane =
+                    |gradient: DVec3| gradient - world_normal * (gradient.dot(view) / slant);
+                let pixel_metres = self.pixel_gradient.dot(local).max(0.0);
+                let across = |gradient| {
+                    let gradient = on_plane(gradient);
+                    (gradient - view * gradient.dot(view)) * pixel_metres
+                };
+                metric(across(here.grad_s), across(here.grad_t))
+            },
         })
     }
 

@@ -112,7 +112,8 @@ mod tests {
             // Halving steps in all directions, down to where nothing gets better.
             let (mut slope, mut step) = (lean, 0.5);
             while step > 1e-5 {
-                let around = (0..16).map(|i| DVec2::from_angle(f64::from(i) * 0.393) * step + slope);
+                let around =
+                    (0..16).map(|i| DVec2::from_angle(f64::from(i) * 0.393) * step + slope);
                 match around.min_by(|&a, &b| thickness(a).total_cmp(&thickness(b))) {
                     Some(better) if thickness(better) < thickness(slope) => slope = better,
                     _ => step *= 0.5,

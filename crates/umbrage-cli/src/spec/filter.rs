@@ -92,6 +92,8 @@ pub(crate) enum FilterOption {
     Offset,
     /// `scale`: double the sum instead.
     Scale,
+    /// `half`: stored at half the map's resolution.
+    Half,
 }
 
 const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "evsm2", "msm", "csm", "pcss"];
@@ -126,7 +128,8 @@ impl Filter {
             Some(BlurWidth::Pixels(w)) => Blur::Width(Width::Pixels(w)),
             Some(BlurWidth::Metres(w)) => Blur::Width(Width::Metres(w)),
         };
-        let prefilter = Prefilter { statistic, blur };
+        let half = options.contains(&FilterOption::Half);
+        let prefilter = Prefilter { statistic, blur, half };
         prefilter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
         Ok(visibility::Filter::Prefiltered(prefilter))
     }
@@ -175,9 +178,9 @@ impl BlurredKind {
     /// Options that go in its parentheses.
     fn known(self) -> &'static [&'static str] {
         match self {
-            Self::Vsm | Self::Msm => &["blur=N", "leak=L"],
-            Self::Esm => &["blur=N", "exponent=C"],
-            Self::Evsm | Self::Evsm2 => &["blur=N", "leak=L", "exponent=C"],
+            Self::Vsm | Self::Msm => &["blur=N", "leak=L", "half"],
+            Self::Esm => &["blur=N", "exponent=C", "half"],
+            Self::Evsm | Self::Evsm2 => &["blur=N", "leak=L", "exponent=C", "half"],
         }
     }
 }
@@ -240,7 +243,8 @@ impl FromStr for Filter {
             "evsm" => blurred(BlurredKind::Evsm),
             "msm" => blurred(BlurredKind::Msm),
             "csm" => {
-                let known = ["blur=N", "leak=L", "attenuation=A", "offset", "scale", "bits=16"];
+                let known =
+                    ["blur=N", "leak=L", "attenuation=A", "offset", "scale", "bits=16", "half"];
                 Ok(Self::Csm(numbered(1..=16)?, parse_options(options, stem, &known)?))
             }
             _ => bail!(
@@ -284,6 +288,7 @@ impl Display for Filter {
                 FilterOption::Attenuation(a) => write!(f, "attenuation={a}")?,
                 FilterOption::Offset => f.write_str("offset")?,
                 FilterOption::Scale => f.write_str("scale")?,
+                FilterOption::Half => f.write_str("half")?,
             }
         }
         if options.is_empty() { Ok(()) } else { f.write_str(")") }
@@ -322,6 +327,7 @@ fn parse_options(text: Option<&str>, filter: &str, known: &[&str]) -> Result<Vec
             },
             ("offset", None) => FilterOption::Offset,
             ("scale", None) => FilterOption::Scale,
+            ("half", None) => FilterOption::Half,
             _ => bail!("`{part}` must be written `{}`", shape.unwrap_or(&name)),
         };
         ensure!(

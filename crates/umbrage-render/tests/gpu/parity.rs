@@ -276,7 +276,8 @@ fn every_prefilter_in_four_scenes() {
         let set = Set::new(&scene, IMAGE);
         for (i, statistic) in statistics.into_iter().enumerate() {
             let (technique, options) = techniques()[[1, 4, 7][i % 3]];
-            let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5) });
+            let half = i % 2 == 1;
+            let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5), half });
             agrees_with(name, &set, technique, &options, filter);
         }
     }
@@ -286,8 +287,10 @@ fn every_prefilter_in_four_scenes() {
 #[test]
 fn every_width_in_four_scenes() {
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
-    let prefilter =
-        |statistic, width| Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width) });
+    let prefilter = |statistic, width| {
+        let half = width == Width::Metres(0.6);
+        Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width), half })
+    };
     for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);

@@ -34,5 +34,5 @@ fn shadow_reconstruct(numbers: array<vec4f, {TEXTURES}>, depth: f32) -> f32 {
         sum += amounts[i].x * (n.x * pair.y - n.y * pair.x) + amounts[i].y * (n.z * next.y - n.w * next.x);
         pair = shadow_turned(next, step);
     }
-    return shadow_without_leak({GAIN} * sum, {LEAK});
+    return ({GAIN} * sum - {LEAK}) / (1.0 - {LEAK});
 }

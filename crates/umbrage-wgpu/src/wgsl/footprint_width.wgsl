@@ -1,28 +1,43 @@
-// As wide across the light as is wanted, whatever the warp: in the smallest copy of the map whose samples are as wide as the narrow side of the
-// footprint, at several places along its long side.
+// As wide as is wanted, whatever the warp: in a copy of the map whose samples are narrower than the footprint, at several places along and across it.
+
+// How many places an axis of variance `rest` (beyond that of a sample) takes, and how far apart they are, in units of the level's texels.
+fn shadow_spread(rest: f32) -> vec2f {
+    if (rest <= 1e-6) {
+        return vec2f(1.0, 0.0);
+    }
+    let n = clamp(ceil(1.5 * sqrt(rest)), 2.0, {MAX_SAMPLES});
+    // Few places, cut off at the ends, do not have the variance of what they stand for.
+    var sum = 0.0;
+    var square = 0.0;
+    for (var i = 0.5; i < n; i += 1.0) {
+        let at = i / n * 4.0 - 2.0;
+        let weight = exp(-0.5 * at * at);
+        sum += weight;
+        square += weight * at * at;
+    }
+    return vec2f(n, sqrt(rest * sum / square) * 4.0 / n);
+}
+
 fn shadow_footprint(receiver: ShadowReceiver) -> ShadowFootprint {
-    let deviation = {DEVIATION} * {WIDTH};
-    let covariance = receiver.metric * (deviation * deviation);
+    let covariance = receiver.metric * {VARIANCE};
     let mean = 0.5 * (covariance.x + covariance.y);
-    let difference = 0.5 * (covariance.x - covariance.y);
-    let spread = length(vec2f(difference, covariance.z));
-    let major = sqrt(mean + spread);
-    let minor = sqrt(max(mean - spread, 0.0));
-    let sample = clamp(max(minor, major / 7.0), 0.5, 0.5 * exp2({LAST_LEVEL}));
-    let size = 2.0 * sample;
-    // Between two levels it is variances that mix linearly, of which the larger is four times the smaller.
-    let level = min(floor(log2(size)), {LAST_LEVEL});
-    let ratio = size / exp2(level);
-    let lod = min(level + clamp((ratio * ratio - 1.0) / 3.0, 0.0, 1.0), {LAST_LEVEL});
-    let rest = sqrt(max(major * major - sample * sample, 0.0));
-    let side = min(ceil(2.0 * rest / size), 7.0);
-    var axis = vec2f(covariance.z, spread - difference);
-    if (difference > 0.0) {
-        axis = vec2f(difference + spread, covariance.z);
+    let half_difference = 0.5 * (covariance.x - covariance.y);
+    let spread = length(vec2f(half_difference, covariance.z));
+    let major = min(mean + spread, 1e12);
+    let minor = max(mean - spread, major / {ANISOTROPY_SQUARED});
+    let level = clamp(floor(0.5 * log2(minor / {LEAST_VARIANCE})), f32({FIRST_LEVEL}), f32({LAST_LEVEL}));
+    // Squares of the level's texels.
+    let texel = exp2(2.0 * level);
+    let along = shadow_spread(major / texel - {SAMPLE_VARIANCE});
+    let across = shadow_spread(minor / texel - {SAMPLE_VARIANCE});
+    var axis = vec2f(covariance.z, spread - half_difference);
+    if (half_difference > 0.0) {
+        axis = vec2f(half_difference + spread, covariance.z);
     }
     let axis_length = length(axis);
-    let step = select(vec2f(0.0), axis / axis_length, axis_length > 0.0) * (2.0 * rest / max(side, 1.0));
-    let least = sample * sample;
+    axis = select(vec2f(1.0, 0.0), axis / axis_length, axis_length > 0.0) * exp2(level);
+    let least = max({SAMPLE_VARIANCE} * texel, minor);
     let wide = vec3f(max(covariance.xy, vec2f(least)), covariance.z);
-    return ShadowFootprint(lod, step, i32(side), wide);
+    let samples = vec2u(u32(along.x), u32(across.x));
+    return ShadowFootprint(i32(level), samples, axis * along.y, vec2f(-axis.y, axis.x) * across.y, wide);
 }

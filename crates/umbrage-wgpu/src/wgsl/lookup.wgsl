@@ -22,6 +22,8 @@ struct ShadowSettings {
     texture_scale: vec2f,
     // Width of a pixel of the viewer's picture, metres: this times a point (homogeneous).
     pixel_gradient: vec4f,
+    // The viewer, in render space.
+    eye: vec4f,
 }
 
 struct ShadowLight {
@@ -72,10 +74,8 @@ struct ShadowReceiver {
     slope: vec2f,
     // How much nearer than the plane a texel's depth may be and not hide it.
     slack: f32,
-    // Squares of the texels to a metre in s and in t, and the product of the two directions.
+    // Squares of the texels that the filter's width covers in s and in t, and the product of the two directions; 0 for filters that count in texels.
     metric: vec3f,
-    // Width of a pixel of the viewer's picture, metres.
-    pixel_metres: f32,
 }
 
 // Where a point is looked up.
@@ -224,8 +224,7 @@ fn shadow_receiver(point: ShadowPoint, normal: vec3f) -> ShadowReceiver {
     let along = dot(normal, beam);
     let tiny = 1e-30;
     let slope = clamp(-across / select(along, tiny, abs(along) < tiny), vec2f(-8.0), vec2f(8.0));
-    let metric = vec3f(ss, tt, st);
-    return ShadowReceiver(point.texel, point.depth, slope, slack + SHADOW_ROUNDING, metric, 0.0);
+    return ShadowReceiver(point.texel, point.depth, slope, slack + SHADOW_ROUNDING, vec3f(0.0));
 }
 
 // The depth from which on a texel does not hide the receiver.
@@ -255,6 +254,6 @@ fn shadow_map_visibility(map: u32, position: vec3f, normal: vec3f) -> f32 {
     }
     var receiver = shadow_receiver(point, normal);
     receiver.texel = clamp(receiver.texel, vec2f(0.0), size);
-    receiver.pixel_metres = max(dot(shadow_settings.pixel_gradient, vec4f(position, 1.0)), 0.0);
+    receiver.metric = {METRIC};
     return shadow_filtered(map, receiver);
 }

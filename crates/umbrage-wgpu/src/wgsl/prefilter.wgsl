@@ -29,12 +29,28 @@ fn shadow_prefilter_vertex(@builtin(vertex_index) index: u32) -> @builtin(positi
 }
 
 //IF ENCODE
+// The numbers of a texel of the map.
+fn shadow_encoded(at: vec2i) -> array<vec4f, {TEXTURES}> {
+    let depth = textureLoad(shadow_prefilter_depths, at, 0);
+    let texel = vec2f(at) + 0.5 - shadow_prefilter_map.origin;
+    let in_slab = shadow_slab_depth(shadow_prefilter_map.beam_scale, shadow_prefilter_map.slab, texel, depth);
+    return shadow_encode(clamp(in_slab, 0.0, 1.0));
+}
+
 @fragment
 fn shadow_prefilter_fragment(@builtin(position) at: vec4f) -> ShadowPrefiltered {
-    let depth = textureLoad(shadow_prefilter_depths, vec2i(at.xy), 0);
-    let texel = at.xy - shadow_prefilter_map.origin;
-    let in_slab = shadow_slab_depth(shadow_prefilter_map.beam_scale, shadow_prefilter_map.slab, texel, depth);
-    let numbers = shadow_encode(clamp(in_slab, 0.0, 1.0));
+//IF HALF
+    let corner = 2 * vec2i(at.xy);
+    var numbers = array<vec4f, {TEXTURES}>();
+    for (var k = 0; k < 4; k++) {
+        let encoded = shadow_encoded(corner + vec2i(k % 2, k / 2));
+        for (var i = 0; i < {TEXTURES}; i++) {
+            numbers[i] += 0.25 * encoded[i];
+        }
+    }
+//ELSE
+    let numbers = shadow_encoded(vec2i(at.xy));
+//END
     return ShadowPrefiltered({VALUES});
 }
 //ELSE

@@ -1,5 +1,5 @@
 // Percentage-closer filtering over a width that knows the warp: N × N comparisons with the nearest texels, spread evenly over a square across the
-// light, or over a texel where that is wider.
+// light or in the picture, or over a texel where that is wider.
 const SHADOW_SPREAD: i32 = {N};
 
 fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
@@ -7,8 +7,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let low = vec2f(-{GUTTER});
     let high = shadow_maps[map].size + {GUTTER} - 1e-3;
     // The sides of the square, as they lie in the map.
-    let side = {WIDTH};
-    let metric = receiver.metric * (side * side);
+    let metric = receiver.metric;
     let across = sqrt(max(metric.x, 1.0));
     let shear = metric.z / across;
     let along = sqrt(max(metric.y - shear * shear, 1.0));

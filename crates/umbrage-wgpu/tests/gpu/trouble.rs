@@ -32,7 +32,7 @@ fn input_that_makes_no_sense_is_named() {
         new(&ShadowOptions { filter: Filter::Spread { n: 3, width }, ..Default::default() });
     assert!(spread.unwrap_err().to_string().starts_with("options.filter: filter.width"));
     let statistic = Statistic::Vsm(Vsm { leak: 2.0 });
-    let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3) });
+    let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3), half: false });
     let leaky = new(&ShadowOptions { filter, ..Default::default() });
     assert!(leaky.unwrap_err().to_string().starts_with("options.filter: filter.leak"));
     let mut shadows = new(&ShadowOptions::default()).unwrap();
@@ -74,7 +74,7 @@ fn spread() -> Filter {
 
 fn vsm() -> Filter {
     let statistic = Statistic::Vsm(Vsm::default());
-    Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3) })
+    Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3), half: false })
 }
 
 #[test]

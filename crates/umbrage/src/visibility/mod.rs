@@ -71,7 +71,7 @@ pub enum Filter {
         n: u32,
     },
     /// Percentage-closer filtering over a width that knows the warp: n × n comparisons with the nearest texels, spread evenly over a square across the
-    /// light, or over a texel where that is wider.
+    /// light or in the picture, or over a texel where that is wider.
     Spread {
         /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
@@ -87,16 +87,16 @@ pub trait Texels {
     /// Depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
     fn depth(&self, i: i32, j: i32) -> f32;
 
-    /// What a prefiltered map has at a point in texel coordinates, between texels bilinearly, and between levels 0, 1, 2 … of half, a quarter … the
-    /// resolution linearly. By default computed there and then, from the depths around.
+    /// What a prefiltered map has at a point in the map's texel coordinates, between texels bilinearly, at a level: at 1 of half the map's resolution, at 2
+    /// of a quarter … By default computed there and then, from the depths around.
     fn statistics(
         &self,
         map: &ShadowMap,
         prefilter: &Prefilter,
         texel: DVec2,
-        lod: f64,
+        level: u32,
     ) -> Channels {
-        prefilter.sample(map, texel, lod, |i, j| self.depth(i, j))
+        prefilter.sample(map, texel, level, |i, j| self.depth(i, j))
     }
 }
 
@@ -216,8 +216,7 @@ pub fn visibility(
             let n = n.clamp(1, Filter::MAX_PCF);
             let [low, high] = drawn(map, filter);
             // The sides of the square, as they lie in the map.
-            let side = width.metres(receiver);
-            let [ss, tt, st] = receiver.texel_metric.map(|m| m * side * side);
+            let [ss, tt, st] = width.metric(receiver);
             let across = ss.max(1.0).sqrt();
             let shear = st / across;
             let along = (tt - shear * shear).max(1.0).sqrt();
@@ -235,8 +234,8 @@ pub fn visibility(
         Filter::Prefiltered(prefilter) => {
             let [low, high] = drawn(map, filter);
             let footprint = prefilter.footprint(receiver);
-            let channels = footprint.gather(texel, [low, high], |texel, lod| {
-                texels.statistics(map, &prefilter, texel, lod)
+            let channels = footprint.gather(texel, [low, high], |texel, level| {
+                texels.statistics(map, &prefilter, texel, level)
             });
             prefilter.visibility(map, receiver, &footprint, &channels)
         }

@@ -11,62 +11,87 @@ pub struct Prefilter {
     pub statistic: Statistic,
     /// How wide the Gaussian is.
     pub blur: Blur,
+    /// Stored at half the resolution of the map, each number the mean over four of the map's texels: a quarter of the memory and of the blur's work.
+    pub half: bool,
 }
 
 /// How wide a Gaussian is: its standard deviation is a quarter of that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Blur {
-    /// So many texels, wherever: blurred ahead of lookup. An odd number, 1 ..= [`Prefilter::MAX_BLUR`]; 1 is no blur.
+    /// So many of the texels that are stored, wherever: blurred ahead of lookup. An odd number, 1 ..= [`Prefilter::MAX_BLUR`]; 1 is no blur.
     Texels(u32),
-    /// A width that knows the warp: looked up in smaller and smaller copies of the map, and where texels are longer one way, at several
-    /// places along it.
+    /// A width that knows the warp: looked up in smaller and smaller copies of the map, at several places along and across it.
     Width(Width),
 }
 
-/// Standard deviation of what a level's sample averages over, as a share of its texel: the box that made it, and the interpolation
-/// between texels.
-const SAMPLE_DEVIATION: f64 = 0.5;
-
-/// The most places to each side of a [`Footprint`]'s middle: 15 in all, as texture units with anisotropy of 16 take.
-const MAX_SIDE: f64 = 7.0;
-
-/// Where a filter samples: at `2 side + 1` places, `step` apart.
+/// Where a filter samples: at `samples[0]` by `samples[1]` places around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Level of detail, from 0 to [`Prefilter::LEVELS`] less one.
-    pub lod: f64,
-    /// From place to place, texels.
-    pub step: DVec2,
-    /// Places to each side of the middle.
-    pub side: u32,
+    /// Level of detail: texels there are two to the power of this wide.
+    pub level: u32,
+    /// Places along the footprint and across it, ≥ 1.
+    pub samples: [u32; 2],
+    /// From place to place along and across, texels.
+    pub steps: [DVec2; 2],
     /// What is averaged over, texels²: variances in s and t, and covariance.
     pub covariance: [f64; 3],
 }
 
-impl Footprint {
-    /// Weights of the places at distances 0 ..= `side`, before they are divided by their sum.
-    pub fn weight(side: u32, k: u32) -> f64 {
-        if side == 0 { 1.0 } else { (-2.0 * (f64::from(k) / f64::from(side)).powi(2)).exp() }
+/// Places along one axis of a Gaussian of standard deviation 1, `n` of them from end to end of ±2: where, and how heavy.
+fn places(n: u32) -> impl Iterator<Item = (f64, f64)> + Clone {
+    (0..n).map(move |i| {
+        let at = (f64::from(i) + 0.5) / f64::from(n) * 4.0 - 2.0;
+        (at, (-0.5 * at * at).exp())
+    })
+}
+
+/// How many places an axis of variance `rest` (beyond that of a sample) takes, and how far apart they are, both in units of the level's texels.
+fn spread(rest: f64) -> (u32, f64) {
+    if rest <= 1e-6 {
+        return (1, 0.0);
     }
+    let n = ((1.5 * rest.sqrt()).ceil() as u32).clamp(2, Footprint::MAX_SAMPLES);
+    // Few places, cut off at the ends, do not have the variance of what they stand for.
+    let (sum, square) = places(n).fold((0.0, 0.0), |(s, q), (at, w)| (s + w, q + w * at * at));
+    (n, (rest * sum / square).sqrt() * 4.0 / f64::from(n))
+}
+
+impl Footprint {
+    /// Variance of what one sample averages over, in squares of the level's texel: the box that made it, and the interpolation between texels.
+    pub const SAMPLE_VARIANCE: f64 = 0.25;
+
+    /// The least variance across a filter, in the same unit, for which a level is taken. With one sample only what is averaged over depends on where
+    /// between texels it falls; with two it hardly does.
+    pub const LEAST_VARIANCE: f64 = 0.5;
+
+    /// How many times longer than across a filter may be; what is longer still gets wider, as with a texture unit's anisotropy of 16.
+    pub const ANISOTROPY: f64 = 16.0;
+
+    /// Samples along one side at most, for those that are wider than the coarsest level is meant for.
+    pub const MAX_SAMPLES: u32 = 36;
 
     /// The mean over the places around `texel`, none nearer to the ends of what is drawn than half a texel of the level.
     pub(super) fn gather(
         &self,
         texel: DVec2,
         [low, high]: [DVec2; 2],
-        sample: impl Fn(DVec2, f64) -> Channels,
+        sample: impl Fn(DVec2, u32) -> Channels,
     ) -> Channels {
-        let inset = DVec2::splat(0.5 * self.lod.ceil().exp2());
+        let inset = DVec2::splat(0.5 * f64::from(1u32 << self.level));
         let [low, high] = [low + inset, high - inset];
-        let side = self.side as i32;
         let mut sum = [0.0; MAX_CHANNELS];
         let mut weights = 0.0;
-        for k in -side..=side {
-            let weight = Self::weight(self.side, k.unsigned_abs()) as f32;
-            weights += weight;
-            let at = (texel + self.step * f64::from(k)).clamp(low, high.max(low));
-            let here = sample(at, self.lod);
-            sum.iter_mut().zip(here).for_each(|(s, h)| *s += weight * h);
+        let [along, across] = self.samples;
+        let middle = self.samples.map(|n| 0.5 * (f64::from(n) - 1.0));
+        for (j, (_, v)) in (0..across).zip(places(across)) {
+            for (i, (_, u)) in (0..along).zip(places(along)) {
+                let offset = self.steps[0] * (f64::from(i) - middle[0])
+                    + self.steps[1] * (f64::from(j) - middle[1]);
+                let weight = (u * v) as f32;
+                weights += weight;
+                let here = sample((texel + offset).clamp(low, high.max(low)), self.level);
+                sum.iter_mut().zip(here).for_each(|(s, h)| *s += weight * h);
+            }
         }
         sum.map(|s| s / weights)
     }
@@ -106,7 +131,7 @@ impl Prefilter {
         }
     }
 
-    /// How many texels to each side the blur ahead of lookup reaches.
+    /// How many of the texels that are stored to each side the blur ahead of lookup reaches.
     pub fn radius_texels(&self) -> u32 {
         match self.blur {
             Blur::Texels(n) => n.min(Self::MAX_BLUR) / 2,
@@ -114,15 +139,20 @@ impl Prefilter {
         }
     }
 
+    /// Level of detail of what is stored: 1 if at half the resolution.
+    pub fn first_level(&self) -> u32 {
+        u32::from(self.half)
+    }
+
     pub(super) fn align_texels(&self) -> u32 {
-        1 << (self.levels() - 1)
+        1 << (self.levels() - 1 + self.first_level())
     }
 
     /// How many texels beyond the map's border lookups of points in the map can reach: the blur's radius, and one more to interpolate; or
     /// the largest texel there is.
     pub(super) fn reach_texels(&self) -> u32 {
         match self.blur {
-            Blur::Texels(_) => self.radius_texels() + 1,
+            Blur::Texels(_) => (self.radius_texels() + 1) << self.first_level(),
             Blur::Width(_) => self.align_texels(),
         }
     }
@@ -145,8 +175,8 @@ impl Prefilter {
             .zip(0u32..)
             .map(|(w, k)| 2.0 * f64::from(w) * f64::from(k).powi(2))
             .sum();
-        // Of the linear weights between texels, in the mean over all places.
-        blur + 1.0 / 6.0
+        // Of the linear weights between texels, in the mean over all places, and of the four texels that one stands for.
+        if self.half { 4.0 * (blur + 1.0 / 6.0) + 0.25 } else { blur + 1.0 / 6.0 }
     }
 
     /// Where to sample for a receiver.
@@ -154,37 +184,40 @@ impl Prefilter {
         let Blur::Width(width) = self.blur else {
             let variance = self.variance_texels();
             return Footprint {
-                lod: 0.0,
-                step: DVec2::ZERO,
-                side: 0,
+                level: self.first_level(),
+                samples: [1, 1],
+                steps: [DVec2::ZERO; 2],
                 covariance: [variance, variance, 0.0],
             };
         };
-        let deviation = Self::DEVIATION * width.metres(receiver);
-        let [ss, tt, st] = receiver.texel_metric.map(|m| m * deviation * deviation);
-        let mean = 0.5 * (ss + tt);
-        let spread = (0.5 * (ss - tt)).hypot(st);
-        let [major, minor] = [(mean + spread).sqrt(), (mean - spread).max(0.0).sqrt()];
-        // Samples as wide as the narrow side, or so wide that they reach along the long one.
-        let largest = f64::from(Self::LEVELS - 1);
-        let sample = minor.max(major / MAX_SIDE);
-        let sample = sample.clamp(SAMPLE_DEVIATION, SAMPLE_DEVIATION * largest.exp2());
-        let size = sample / SAMPLE_DEVIATION;
-        // Between two levels it is variances that mix linearly, of which the larger is four times the smaller.
-        let level = size.log2().floor().min(largest);
-        let fraction = ((size * size / level.exp2().powi(2) - 1.0) / 3.0).clamp(0.0, 1.0);
-        let lod = (level + fraction).min(largest);
-        let rest = (major * major - sample * sample).max(0.0).sqrt();
-        let side = (2.0 * rest / size).ceil().min(MAX_SIDE);
+        let variance = Self::DEVIATION * Self::DEVIATION;
+        let [ss, tt, st] = width.metric(receiver).map(|m| m * variance);
+        let (mean, half_difference) = (0.5 * (ss + tt), 0.5 * (ss - tt));
+        let spread_of = half_difference.hypot(st);
+        let [first, last] = [self.first_level(), self.first_level() + Self::LEVELS - 1];
+        let major = (mean + spread_of).min(1e12);
+        let minor = (mean - spread_of).max(major / (Footprint::ANISOTROPY * Footprint::ANISOTROPY));
+        let level = 0.5 * (minor / Footprint::LEAST_VARIANCE).log2();
+        let level = level.floor().clamp(f64::from(first), f64::from(last));
+        // Squares of the level's texels.
+        let texel = (2.0 * level).exp2();
+        let beyond = |variance: f64| spread(variance / texel - Footprint::SAMPLE_VARIANCE);
+        let [(along, step), (across, step_across)] = [beyond(major), beyond(minor)];
         // An eigenvector, by the row of the matrix that has more digits.
-        let axis = if ss > tt {
-            DVec2::new(0.5 * (ss - tt) + spread, st)
+        let axis = if half_difference > 0.0 {
+            DVec2::new(half_difference + spread_of, st)
         } else {
-            DVec2::new(st, 0.5 * (tt - ss) + spread)
+            DVec2::new(st, spread_of - half_difference)
         };
-        let step = axis.normalize_or_zero() * (2.0 * rest / side.max(1.0));
-        let least = sample * sample;
-        Footprint { lod, step, side: side as u32, covariance: [ss.max(least), tt.max(least), st] }
+        let axis = axis.try_normalize().unwrap_or(DVec2::X);
+        let size = level.exp2();
+        let least = (Footprint::SAMPLE_VARIANCE * texel).max(minor);
+        Footprint {
+            level: level as u32,
+            samples: [along, across],
+            steps: [axis * (step * size), axis.perp() * (step_across * size)],
+            covariance: [ss.max(least), tt.max(least), st],
+        }
     }
 
     /// The numbers of one texel of this depth, before they are stored.
@@ -200,28 +233,10 @@ impl Prefilter {
         &self,
         map: &ShadowMap,
         texel: DVec2,
-        lod: f64,
+        level: u32,
         depth: impl Fn(i32, i32) -> f32,
     ) -> Channels {
-        let lower = lod.floor();
-        let at = |level: f64| self.sample_level(map, texel, level.exp2() as i32, &depth);
-        let fraction = (lod - lower) as f32;
-        let mut sum = at(lower);
-        if fraction > 0.0 {
-            let upper = at(lower + 1.0);
-            sum.iter_mut().zip(upper).for_each(|(s, u)| *s += fraction * (u - *s));
-        }
-        sum
-    }
-
-    /// The same between texels of `size` texels.
-    fn sample_level(
-        &self,
-        map: &ShadowMap,
-        texel: DVec2,
-        size: i32,
-        depth: impl Fn(i32, i32) -> f32,
-    ) -> Channels {
+        let size = 1 << level;
         let mut sum = [0f64; MAX_CHANNELS];
         let radius = self.radius_texels() as i32;
         let mut weights = [0.0; Self::MAX_BLUR as usize / 2 + 1];

@@ -2,22 +2,23 @@ use crate::error::{Error, check};
 use crate::plan::Receiver;
 use std::fmt;
 
-/// How wide a filter is across the light, whatever the warp and the resolution: as wide near as far, and in every partition.
+/// How wide a filter is, whatever the warp and the resolution: as wide near as far, and in every partition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Width {
-    /// As wide as so many pixels of the picture at the receiver's distance: for smooth edges.
+    /// So many pixels of the picture, whichever way the surface lies in it: for smooth edges.
     Pixels(f32),
-    /// So many metres: for soft shadows.
+    /// So many metres across the light: for soft shadows.
     Metres(f32),
 }
 
 impl Width {
-    /// Metres at a receiver.
-    pub fn metres(self, receiver: &Receiver) -> f64 {
-        match self {
-            Self::Pixels(pixels) => f64::from(pixels) * receiver.pixel_metres,
-            Self::Metres(metres) => f64::from(metres),
-        }
+    /// Squares of the texels that a line of this width covers in s and in t, and the product of the two, as in [`Receiver::texel_metric`].
+    pub(crate) fn metric(self, receiver: &Receiver) -> [f64; 3] {
+        let (width, metric) = match self {
+            Self::Pixels(pixels) => (f64::from(pixels), receiver.pixel_metric),
+            Self::Metres(metres) => (f64::from(metres), receiver.texel_metric),
+        };
+        metric.map(|m| m * width * width)
     }
 
     pub(crate) fn check(self) -> Result<(), Error> {

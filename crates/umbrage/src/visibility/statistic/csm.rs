@@ -1,4 +1,4 @@
-use super::{Channels, Encoding, Storage, check_leak, without_leak};
+use super::{Channels, Encoding, Storage, check_leak};
 use crate::error::{Error, check};
 use crate::theory::FourierStep;
 use std::f32::consts::PI;
@@ -129,7 +129,7 @@ impl Encoding for Csm {
                 amount * (pair[0] * cos - pair[1] * sin)
             })
             .sum();
-        without_leak(self.gain() * (0.5 + sum), self.leak)
+        (self.gain() * (0.5 + sum) - self.leak) / (1.0 - self.leak)
     }
 
     fn plane_deviations(&self) -> f32 {
