@@ -76,8 +76,17 @@ impl Technique {
             TexelSize::Exact(size) => Size::Exact(size),
         };
         let partition = partition::partition(spec.slices.as_ref(), spec.faces);
-        let options =
-            Options { warp: spec.warp, partition, size, max_side: MAX_SIDE, ..Options::default() };
+        // Penumbrae depend on how far casters lie.
+        let keeps_casters = matches!(filter, visibility::Filter::Pcss { .. });
+        let warp = spec.warp;
+        let options = Options {
+            warp,
+            partition,
+            size,
+            max_side: MAX_SIDE,
+            keeps_casters,
+            ..Options::default()
+        };
         Ok(Self { spec, options, filter })
     }
 

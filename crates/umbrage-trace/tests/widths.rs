@@ -5,7 +5,7 @@ mod common;
 use common::{ground, nobody, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::visibility::statistic::{Csm, Statistic};
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
+use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Partition, Planner, Size, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
@@ -39,6 +39,7 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
         warp,
         partition: Partition { overlap: 0.2, ..Partition::slices(slices) },
         size: Size::Budget(1536 * 1536),
+        keeps_casters: matches!(filter, Filter::Pcss { .. }),
         ..Options::default()
     };
     let bounds = Bounds::of_scene(scene.bounds());
@@ -99,7 +100,7 @@ const RISE: f64 = 2.0 * 1.2816;
 #[test]
 fn comparisons_are_as_wide_as_told_everywhere() {
     // A box rises from 10% to 90% over 0.8 of its width.
-    let filter = Filter::Spread { n: 15, width: Width::Metres(1.2) };
+    let filter = Filter::Spread { n: 15, width: Width::Metres(1.2), pattern: Pattern::Grid };
     for (warp, slices) in TECHNIQUES {
         for ramp in ramps(filter, warp, slices) {
             let ratio = ramp.metres / (0.8 * 1.2);
@@ -126,6 +127,22 @@ fn pixels_are_those_of_the_picture() {
         for ramp in ramps.into_iter().filter(|r| r.distance < 40.0) {
             let ratio = ramp.pixels / (RISE * Prefilter::DEVIATION * 16.0);
             assert!((ratio - 1.0).abs() < 0.2, "{warp:?}: {ramp:?}");
+        }
+    }
+}
+
+/// Under a disc of light the penumbra is as wide as the light, seen from the edge that casts it. (Far from the viewer texels of a perspective shadow map are as
+/// wide as that.)
+#[test]
+fn penumbrae_follow_the_distance_of_what_casts_them() {
+    let source = 0.4;
+    // From 10% to 90% of a disc's area it is so far along its diameter; the sheet lies 3 m above.
+    let expected = 0.687 * source * 3.0 / LIGHT.normalize().y.abs();
+    for (warp, slices) in &TECHNIQUES[..3] {
+        let filter = Filter::Pcss { n: 8, source: source as f32 };
+        for ramp in ramps(filter, *warp, *slices) {
+            let ratio = ramp.metres / expected;
+            assert!((ratio - 1.0).abs() < 0.25, "{warp:?}: {ratio} {ramp:?}");
         }
     }
 }

@@ -189,7 +189,7 @@ impl Shadows {
             .filter
             .check()
             .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
-        let is_spread = matches!(options.filter, Filter::Spread { .. });
+        let is_spread = matches!(options.filter, Filter::Spread { .. } | Filter::Pcss { .. });
         if is_spread && !support.depth_fetch {
             return Err(Error::Unsupported {
                 what: "fetching of depths",

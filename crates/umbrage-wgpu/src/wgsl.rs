@@ -3,7 +3,7 @@
 use crate::{Comparison, Layout, ShadowOptions, Support};
 use std::ops::Range;
 use umbrage::visibility::statistic::Statistic;
-use umbrage::visibility::{Blur, Filter, Footprint, Prefilter, Width};
+use umbrage::visibility::{Blur, Filter, Footprint, Pattern, Prefilter, Width};
 
 /// What a device without storage buffers can be told of: sizes of the uniform arrays.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -54,15 +54,39 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
         }
     };
     match filter {
-        Filter::Spread { n, .. } => include_str!("wgsl/spread.wgsl")
-            .replace("{N}", &n.clamp(1, Filter::MAX_PCF).to_string())
-            .replace("{GUTTER}", &number(filter.reach_texels() as f32)),
+        Filter::Spread { n, pattern, .. } => {
+            spread(&filter, n, pattern) + include_str!("wgsl/spread.wgsl")
+        }
+        Filter::Pcss { n, source } => {
+            spread(&filter, n, Pattern::Poisson)
+                + &include_str!("wgsl/pcss.wgsl").replace("{SOURCE}", &number(source))
+        }
         Filter::Pcf { n } => {
             let n = n.clamp(1, Filter::MAX_PCF).to_string();
             include_str!("wgsl/pcf_weight.wgsl").replace("{N}", &n) + pcf
         }
         _ => hard.to_owned(),
     }
+}
+
+/// Comparisons over a width, n² of them.
+fn spread(filter: &Filter, n: u32, pattern: Pattern) -> String {
+    let (n, places) = match pattern {
+        Pattern::Grid => {
+            (n.clamp(1, Filter::MAX_PCF), include_str!("wgsl/pattern_grid.wgsl").to_owned())
+        }
+        Pattern::Poisson => {
+            let n = n.clamp(1, Filter::MAX_DISC);
+            let places =
+                Filter::disc_places(n * n).iter().map(|[x, y]| format!("vec2f({x:?}, {y:?})"));
+            let places = places.collect::<Vec<_>>().join(", ");
+            (n, include_str!("wgsl/pattern_disc.wgsl").replace("{PLACES}", &places))
+        }
+    };
+    let offset = include_str!("wgsl/offset.wgsl")
+        .replace("{N}", &n.to_string())
+        .replace("{GUTTER}", &number(filter.reach_texels() as f32));
+    [&offset, places.as_str(), ""].join("\n")
 }
 
 /// Looks up what was filtered ahead.
@@ -114,6 +138,9 @@ fn metric(filter: &Filter) -> String {
         _ => None,
     };
     match width {
+        _ if matches!(filter, Filter::Pcss { .. }) => {
+            "shadow_metric(point.grad_s, point.grad_t)".to_owned()
+        }
         Some(Width::Metres(metres)) => {
             format!("shadow_metric(point.grad_s, point.grad_t) * {:?}", metres * metres)
         }
@@ -326,9 +353,12 @@ mod tests {
             blurs.map(|blur| Filter::Prefiltered(Prefilter { statistic, blur, half: false }))
         });
         let widths = [Width::Metres(0.5), Width::Pixels(3.0)];
-        let spread = widths.map(|width| Filter::Spread { n: 5, width });
+        let spread = [Pattern::Grid, Pattern::Poisson]
+            .into_iter()
+            .flat_map(move |pattern| widths.map(|width| Filter::Spread { n: 5, width, pattern }));
+        let soft = [1, 8].map(|n| Filter::Pcss { n, source: 0.5 });
         let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
-        let filters = filters.chain(prefiltered).chain(spread);
+        let filters = filters.chain(prefiltered).chain(spread).chain(soft);
         let with = |filter| {
             let comparisons = [Comparison::PerTexel, Comparison::Hardware];
             comparisons.into_iter().flat_map(move |comparison| {

@@ -14,6 +14,9 @@ pub struct Options {
     pub max_side: u32,
     /// Sides of maps are multiples of this, texels, 1 ..= `max_side`.
     pub align: u32,
+    /// Whether depths begin where the casters do rather than where the receivers do. Casters nearer the light are flattened otherwise, which shadow tests do not
+    /// mind; but maps then do not tell how far they lie, as soft shadows ask. Without known [casters](crate::Bounds::casters) it changes nothing.
+    pub keeps_casters: bool,
 }
 
 impl Default for Options {
@@ -25,6 +28,7 @@ impl Default for Options {
             size: Size::Budget(1024 * 1024),
             max_side: 8192,
             align: 1,
+            keeps_casters: false,
         }
     }
 }

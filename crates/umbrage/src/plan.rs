@@ -238,9 +238,13 @@ pub struct Receiver {
     /// Slope of the surface's plane in shadow space, ∂depth/∂(s, t). Perspective maps take planes to
     /// planes, so this holds on the whole plane. Infinite where the surface is edge-on to the light.
     pub slope: DVec2,
+    /// The same of the plane across the beam through the point: not zero where a warp tilts depth.
+    pub level_slope: DVec2,
     /// What half a texel is worth in depth: half of the longest way across its
     /// [footprint](crate::aliasing::Footprint), laid along the beam.
     pub half_texel: f64,
+    /// Growth of depth along the beam, 1/m.
+    pub depth_per_metre: f64,
     /// How texels lie across the light: squares of the texels to a metre in s and in t, and the product of the two
     /// directions (0 where they are perpendicular). A disc of radius r metres has r² times this for its covariance, but for a factor.
     pub texel_metric: [f64; 3],
@@ -299,6 +303,19 @@ impl ShadowMap {
         (self.linear_depth(st, depth) - begin - slope.dot(st)) / thickness
     }
 
+    /// How wide the penumbra is of what lies at `depth` on the beam through `st`, for a light of diameter 1: metres across the receiver's beam, for the sun per
+    /// metre of distance from it (Fernando 2005).
+    pub(crate) fn penumbra(&self, receiver: &Receiver, st: DVec2, depth: f64) -> f64 {
+        let [[here, step], [there, _]] = [receiver.st, st].map(|st| self.beam_scale(st));
+        let level = receiver.depth + receiver.level_slope.dot(st - receiver.st);
+        if step == 0.0 {
+            return ((level - depth) / (receiver.depth_per_metre * there / here)).max(0.0);
+        }
+        // Distances from a lamp go with one over the fourth coordinate.
+        let [at, level] = [depth, level].map(|d| there + step * d);
+        if level > 0.0 { (at / level - 1.0).clamp(0.0, 1e6) } else { 0.0 }
+    }
+
     /// How slab depth changes along a surface of this slope, ∂depth/∂(s, t), per unit of s and t.
     pub(crate) fn slab_slope(&self, st: DVec2, depth: f64, slope: DVec2) -> DVec2 {
         let [begin, step] = self.beam_scale(st);
@@ -337,14 +354,19 @@ impl ShadowMap {
         let local = world_position - self.origin;
         let here = (!self.is_empty()).then(|| Local::at(self, local))??;
         let world_normal = world_normal.try_normalize()?;
-        // In shadow space the plane's covector is the world's times the inverse matrix.
-        let plane = world_normal.extend(-world_normal.dot(local));
-        let shadow_plane = self.local_from_shadow.transpose() * plane;
-        let slope = -shadow_plane.xy() / shadow_plane.z;
+        // In shadow space a plane's covector is the world's times the inverse matrix.
+        let slope = |normal: DVec3| {
+            let plane = normal.extend(-normal.dot(local));
+            let shadow_plane = self.local_from_shadow.transpose() * plane;
+            let slope = -shadow_plane.xy() / shadow_plane.z;
+            if slope.is_finite() { slope } else { DVec2::INFINITY }
+        };
         Some(Receiver {
             st: here.shadow.truncate(),
             depth: here.shadow.z,
-            slope: if slope.is_finite() { slope } else { DVec2::INFINITY },
+            slope: slope(world_normal),
+            level_slope: slope(here.beam),
+            depth_per_metre: here.depth_per_metre,
             half_texel: 0.5 * here.footprint().longest() * here.depth_per_metre,
             texel_metric: metric(here.grad_s, here.grad_t),
             pixel_metric: {

@@ -121,7 +121,7 @@ impl Planner {
         plan.maps.truncate(units.len());
         resolutions(options, units, sizes)?;
         for ((map, draft), &size) in plan.maps.iter_mut().zip(drafts).zip(&*sizes) {
-            scratch.finish(map, draft, size, camera, options)?;
+            scratch.finish(map, draft, size, camera, bounds, options)?;
         }
         Ok(plan)
     }
@@ -279,6 +279,9 @@ impl Request<'_> {
     }
 }
 
+/// Casters that lie farther before the receivers than this many of their ranges of depth are flattened in any case: the receivers' own depths need the digits.
+const MOST_CASTER_DEPTHS: f64 = 1000.0;
+
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 struct Scratch {
@@ -287,6 +290,7 @@ struct Scratch {
     covered: Vec<Seen>,
     outline: Vec<DVec2>,
     worst: worst::Scratch,
+    casters: Body,
     points: Vec<DVec3>,
 }
 
@@ -373,6 +377,20 @@ impl Scratch {
         unit_errors(map, body, camera)
     }
 
+    /// How far before depth 0 the first of what can cast into a map lies, in depth, ≥ 0.
+    fn nearest_caster(&mut self, map: &ShadowMap, casters: Aabb) -> f64 {
+        let body = &mut self.casters;
+        body.set_box(body.sides(casters.relative_to(map.origin)));
+        map.caster_planes.iter().for_each(|&p| body.clip(p));
+        let depth = |&v: &DVec3| {
+            let h = map.shadow_from_local * v.extend(1.0);
+            (h.w > 0.0).then_some(h.z / h.w)
+        };
+        let (nearest, _) = range(body.vertices().iter().filter_map(depth));
+        // Before a lamp itself there is no end to depth.
+        if nearest.is_finite() { (-nearest).clamp(0.0, MOST_CASTER_DEPTHS) } else { 0.0 }
+    }
+
     /// Gives a map its resolution and all that follows from it.
     fn finish(
         &mut self,
@@ -380,6 +398,7 @@ impl Scratch {
         draft: &Draft,
         size: [u32; 2],
         camera: &Camera,
+        bounds: &Bounds<'_>,
         options: &Options,
     ) -> Result<(), Error> {
         if draft.body.is_empty() {
@@ -404,6 +423,13 @@ impl Scratch {
         }
         if draft.still.is_none() {
             map.begin_earlier(MARGIN_TEXELS * texel_depth(map, &draft.body));
+        }
+        if let Some(casters) = bounds.casters
+            && options.keeps_casters
+        {
+            map.begin_earlier(self.nearest_caster(map, casters));
+        }
+        if draft.still.is_none() {
             // A map of the whole scene stays as it is whatever is seen of it.
             if options.warp != Warp::Unfocused {
                 map.slab = slab(map, &draft.body, &mut self.points);

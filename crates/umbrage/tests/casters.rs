@@ -6,7 +6,7 @@ use common::{Config, WARPS, config, direction, map_count, options, partition, po
 use glam::DVec3;
 use proptest::prelude::*;
 use std::cell::Cell;
-use umbrage::{Aabb, Light, Options, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Partition, Planner, SpotLight, Warp};
 
 /// Where the way from `p` to the light ends, in lengths of the vector given; parallel light's goes on.
 fn way_to_light(light: &Light, p: DVec3) -> (DVec3, f64) {
@@ -127,4 +127,68 @@ fn whatever_is_hit_may_cast() {
     let share = culled as f64 / asked as f64;
     println!("{hits} hits; {share:.3} of {asked} pairs of a thing and a map are culled");
     assert!(hits > 10_000 && share > 0.5, "{hits} hits, {share} culled");
+}
+
+/// Maps that keep their casters tell how far every one of them lies; the others flatten what lies before the receivers.
+#[test]
+fn casters_keep_their_depths_if_asked() {
+    let camera = Camera::look_at(LookAt {
+        eye: DVec3::new(0.0, 2.0, 0.0),
+        target: DVec3::new(0.0, 0.0, -20.0),
+        up: DVec3::Y,
+        fov_y_rad: 1.0,
+        near: 0.5,
+        far: 100.0,
+        image: [640, 360],
+    })
+    .unwrap();
+    let bounds = Bounds {
+        receivers: Some(Aabb::new(DVec3::new(-50.0, 0.0, -60.0), DVec3::new(50.0, 1.0, 10.0))),
+        casters: Some(Aabb::new(DVec3::new(-80.0, 0.0, -90.0), DVec3::new(80.0, 40.0, 40.0))),
+        receiver_parts: &[],
+    };
+    let spot = SpotLight {
+        position: DVec3::new(3.0, 60.0, -10.0),
+        direction: DVec3::new(0.0, -1.0, -0.1),
+        half_angle_rad: 0.6,
+        near: 0.1,
+        range: 200.0,
+    };
+    let lights = [Light::Directional { direction: DVec3::new(0.5, -1.0, 0.2) }, Light::Spot(spot)];
+    for warp in [Warp::Uniform, Warp::Lispsm, Warp::Psm, Warp::Stable] {
+        let nearest = |keeps_casters| {
+            let options = Options {
+                warp,
+                keeps_casters,
+                partition: Partition::slices(2),
+                ..Options::default()
+            };
+            let mut planner = Planner::new();
+            let plan = planner.plan(&camera, &lights, &bounds, &options).unwrap();
+            let mut nearest = f64::INFINITY;
+            for map in plan.maps.iter().filter(|m| !m.is_empty()) {
+                for i in 0..9000 {
+                    let at = DVec3::new(
+                        f64::from(i % 30) / 29.0,
+                        f64::from(i / 30 % 10) / 9.0,
+                        f64::from(i / 300) / 29.0,
+                    );
+                    let p = DVec3::new(-80.0, 0.0, -90.0) + at * DVec3::new(160.0, 40.0, 130.0);
+                    let local = p - map.origin;
+                    if map.caster_planes.iter().all(|plane| plane.distance(local) > 0.0)
+                        && let Some(shadow) = map.project(p)
+                    {
+                        nearest = nearest.min(shadow.z);
+                    }
+                }
+            }
+            nearest
+        };
+        assert!(
+            nearest(true) >= 0.0 && nearest(false) < -0.5,
+            "{warp:?}: {} {}",
+            nearest(true),
+            nearest(false)
+        );
+    }
 }

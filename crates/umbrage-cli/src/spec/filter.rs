@@ -19,7 +19,7 @@ pub(crate) enum Filter {
     /// Convolution shadow maps with M terms.
     Csm(u32, Vec<FilterOption>),
     /// Percentage-closer soft shadows.
-    Pcss,
+    Pcss(Vec<FilterOption>),
 }
 
 /// Which statistics of depth a blurred map stores.
@@ -94,7 +94,67 @@ pub(crate) enum FilterOption {
     Scale,
     /// `half`: stored at half the map's resolution.
     Half,
+    /// `poisson`: comparisons without an order.
+    Poisson,
+    /// `light=Xdeg`, `light=Xm`: how large the light is.
+    Light(LightSize),
+    /// `samples=N`: N × N of them.
+    Samples(u32),
 }
+
+/// How large a light is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum LightSize {
+    /// The sun's diameter, as seen from here.
+    Degrees(f32),
+    /// A lamp's diameter.
+    Metres(f32),
+}
+
+impl LightSize {
+    /// As [`visibility::Filter::Pcss`] has it.
+    fn diameter(self) -> f32 {
+        match self {
+            Self::Degrees(angle) => 2.0 * (0.5 * angle).to_radians().tan(),
+            Self::Metres(diameter) => diameter,
+        }
+    }
+}
+
+/// Our sun.
+impl Default for LightSize {
+    fn default() -> Self {
+        Self::Degrees(0.53)
+    }
+}
+
+impl FromStr for LightSize {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let number = |digits: &str, most: f32| match digits.parse::<f32>() {
+            Ok(size) if size > 0.0 && size <= most => Ok(size),
+            _ => bail!("`light={text}` must be a positive size, as in light=0.53deg or light=0.2m"),
+        };
+        match (text.strip_suffix("deg"), text.strip_suffix('m')) {
+            (Some(degrees), _) => number(degrees, 90.0).map(Self::Degrees),
+            (_, Some(metres)) => number(metres, 1e6).map(Self::Metres),
+            _ => number("", 0.0).map(Self::Metres),
+        }
+    }
+}
+
+impl Display for LightSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Degrees(size) => write!(f, "{size}deg"),
+            Self::Metres(size) => write!(f, "{size}m"),
+        }
+    }
+}
+
+/// Of `pcss`, to each side.
+const DEFAULT_SAMPLES: u32 = 6;
 
 const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "evsm2", "msm", "csm", "pcss"];
 
@@ -104,7 +164,11 @@ impl Filter {
         let (statistic, options) = match self {
             Self::Hard => return Ok(visibility::Filter::Hard),
             Self::Pcf(n, options) => {
+                let is_poisson = options.contains(&FilterOption::Poisson);
                 let width = match blur(options) {
+                    None if is_poisson => {
+                        bail!("`{self}` needs a width, as in pcf{n}(blur=2px,poisson)")
+                    }
                     None => return Ok(visibility::Filter::pcf(*n)?),
                     Some(BlurWidth::Pixels(w)) => Width::Pixels(w),
                     Some(BlurWidth::Metres(w)) => Width::Metres(w),
@@ -112,12 +176,28 @@ impl Filter {
                         bail!("`{self}`: pcf is N texels wide unless told in px or m")
                     }
                 };
-                let filter = visibility::Filter::Spread { n: *n, width };
+                let pattern = if is_poisson {
+                    visibility::Pattern::Poisson
+                } else {
+                    visibility::Pattern::Grid
+                };
+                let filter = visibility::Filter::Spread { n: *n, width, pattern };
                 filter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
                 return Ok(filter);
             }
-            Self::Pcss => {
-                bail!("`pcss` is not available in this version; `pcfN` and the blurred filters are")
+            Self::Pcss(options) => {
+                let source = options.iter().find_map(|o| match o {
+                    FilterOption::Light(source) => Some(source.diameter()),
+                    _ => None,
+                });
+                let n = options.iter().find_map(|o| match o {
+                    FilterOption::Samples(n) => Some(*n),
+                    _ => None,
+                });
+                let source = source.unwrap_or_else(|| LightSize::default().diameter());
+                let filter = visibility::Filter::Pcss { n: n.unwrap_or(DEFAULT_SAMPLES), source };
+                filter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
+                return Ok(filter);
             }
             Self::Blurred(kind, options) => (kind.statistic(options), options),
             Self::Csm(order, options) => (csm(*order, options)?, options),
@@ -236,8 +316,13 @@ impl FromStr for Filter {
                 Ok(Self::Blurred(BlurredKind::Evsm2, options))
             }
             "hard" => no_options().and_then(|()| plain(Self::Hard)),
-            "pcf" => Ok(Self::Pcf(numbered(1..=15)?, parse_options(options, stem, &["blur=Wpx"])?)),
-            "pcss" => no_options().and_then(|()| plain(Self::Pcss)),
+            "pcf" => Ok(Self::Pcf(
+                numbered(1..=15)?,
+                parse_options(options, stem, &["blur=Wpx", "poisson"])?,
+            )),
+            "pcss" => {
+                plain(Self::Pcss(parse_options(options, stem, &["light=Xdeg", "samples=N"])?))
+            }
             "vsm" => blurred(BlurredKind::Vsm),
             "esm" => blurred(BlurredKind::Esm),
             "evsm" => blurred(BlurredKind::Evsm),
@@ -268,7 +353,10 @@ impl Display for Filter {
                 write!(f, "pcf{n}")?;
                 options
             }
-            Self::Pcss => return f.write_str("pcss"),
+            Self::Pcss(options) => {
+                f.write_str("pcss")?;
+                options
+            }
             Self::Blurred(kind, options) => {
                 f.write_str(kind.name())?;
                 options
@@ -289,6 +377,9 @@ impl Display for Filter {
                 FilterOption::Offset => f.write_str("offset")?,
                 FilterOption::Scale => f.write_str("scale")?,
                 FilterOption::Half => f.write_str("half")?,
+                FilterOption::Poisson => f.write_str("poisson")?,
+                FilterOption::Light(size) => write!(f, "light={size}")?,
+                FilterOption::Samples(n) => write!(f, "samples={n}")?,
             }
         }
         if options.is_empty() { Ok(()) } else { f.write_str(")") }
@@ -328,6 +419,11 @@ fn parse_options(text: Option<&str>, filter: &str, known: &[&str]) -> Result<Vec
             ("offset", None) => FilterOption::Offset,
             ("scale", None) => FilterOption::Scale,
             ("half", None) => FilterOption::Half,
+            ("poisson", None) => FilterOption::Poisson,
+            ("light", Some(size)) => FilterOption::Light(size.parse()?),
+            ("samples", Some(n)) => {
+                FilterOption::Samples(parse_count(n, "samples=", 1..=visibility::Filter::MAX_DISC)?)
+            }
             _ => bail!("`{part}` must be written `{}`", shape.unwrap_or(&name)),
         };
         ensure!(

@@ -282,7 +282,7 @@ fn filter() -> impl Strategy<Value = Filter> {
         Just(Filter::Hard),
         (1u32..=15, proptest::option::of(width()))
             .prop_map(|(n, width)| Filter::Pcf(n, width.into_iter().collect())),
-        Just(Filter::Pcss),
+        Just(Filter::Pcss(vec![])),
         blurred(BlurredKind::Vsm),
         blurred(BlurredKind::Esm),
         blurred(BlurredKind::Evsm),

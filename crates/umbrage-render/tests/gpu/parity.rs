@@ -3,7 +3,7 @@
 use crate::{GPU, Set, scene};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
+use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{
     Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
 };
@@ -295,15 +295,18 @@ fn every_width_in_four_scenes() {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         let filters = [
-            Filter::Spread { n: 5, width: Width::Pixels(3.0) },
-            Filter::Spread { n: 4, width: Width::Metres(0.5) },
+            Filter::Spread { n: 5, width: Width::Pixels(3.0), pattern: Pattern::Grid },
+            Filter::Spread { n: 4, width: Width::Metres(0.5), pattern: Pattern::Grid },
+            Filter::Spread { n: 6, width: Width::Metres(0.4), pattern: Pattern::Poisson },
+            Filter::Pcss { n: 6, source: 0.3 },
             prefilter(Statistic::Vsm(Vsm::default()), Width::Pixels(4.0)),
             prefilter(csm, Width::Pixels(2.0)),
             prefilter(csm, Width::Metres(0.6)),
             prefilter(Statistic::Msm(Msm::default()), Width::Metres(3.0)),
         ];
         for (i, filter) in filters.into_iter().enumerate() {
-            let (technique, options) = techniques()[[1, 4, 7][i % 3]];
+            let (technique, mut options) = techniques()[[1, 4, 7][i % 3]];
+            options.keeps_casters = matches!(filter, Filter::Pcss { .. });
             agrees_with(name, &set, technique, &options, filter);
         }
     }

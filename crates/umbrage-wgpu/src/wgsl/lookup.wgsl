@@ -76,6 +76,10 @@ struct ShadowReceiver {
     slack: f32,
     // Squares of the texels that the filter's width covers in s and in t, and the product of the two directions; 0 for filters that count in texels.
     metric: vec3f,
+    // Growth of depth along the beam.
+    depth_per_metre: f32,
+    // Depth per texel of the plane across the beam: not zero where a warp tilts depth.
+    level_slope: vec2f,
 }
 
 // Where a point is looked up.
@@ -224,7 +228,19 @@ fn shadow_receiver(point: ShadowPoint, normal: vec3f) -> ShadowReceiver {
     let along = dot(normal, beam);
     let tiny = 1e-30;
     let slope = clamp(-across / select(along, tiny, abs(along) < tiny), vec2f(-8.0), vec2f(8.0));
-    return ShadowReceiver(point.texel, point.depth, slope, slack + SHADOW_ROUNDING, vec3f(0.0));
+    let level_slope = -vec2f(
+        dot(beam, cross(point.grad_t, point.grad_depth)),
+        dot(beam, cross(point.grad_depth, point.grad_s)),
+    ) / dot(beam, beam);
+    return ShadowReceiver(
+        point.texel,
+        point.depth,
+        slope,
+        slack + SHADOW_ROUNDING,
+        vec3f(0.0),
+        depth_per_metre,
+        level_slope,
+    );
 }
 
 // The depth from which on a texel does not hide the receiver.

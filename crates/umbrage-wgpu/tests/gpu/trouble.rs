@@ -4,7 +4,7 @@ use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
+use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{Faces, Options, Partition, Size, Warp};
 use umbrage_wgpu::{
     Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
@@ -28,8 +28,10 @@ fn input_that_makes_no_sense_is_named() {
     let error = new(&ShadowOptions { filter: Filter::Pcf { n: 99 }, ..Default::default() });
     assert!(error.unwrap_err().to_string().starts_with("options.filter"));
     let width = Width::Metres(f32::NAN);
-    let spread =
-        new(&ShadowOptions { filter: Filter::Spread { n: 3, width }, ..Default::default() });
+    let spread = new(&ShadowOptions {
+        filter: Filter::Spread { n: 3, width, pattern: Pattern::Grid },
+        ..Default::default()
+    });
     assert!(spread.unwrap_err().to_string().starts_with("options.filter: filter.width"));
     let statistic = Statistic::Vsm(Vsm { leak: 2.0 });
     let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3), half: false });
@@ -69,7 +71,7 @@ fn filters_that_a_device_cannot_have_are_named() {
 }
 
 fn spread() -> Filter {
-    Filter::Spread { n: 3, width: Width::Pixels(2.0) }
+    Filter::Spread { n: 3, width: Width::Pixels(2.0), pattern: Pattern::Poisson }
 }
 
 fn vsm() -> Filter {

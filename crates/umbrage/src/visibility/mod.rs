@@ -34,6 +34,7 @@
 
 pub mod statistic;
 
+mod disc;
 mod prefilter;
 mod width;
 
@@ -75,11 +76,42 @@ pub enum Filter {
     Spread {
         /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
-        /// Side of the square.
+        /// Side of the square, or diameter of the disc.
         width: Width,
+        /// Where they are made.
+        pattern: Pattern,
+    },
+    /// Percentage-closer soft shadows (Fernando 2005): a search for what hides the receiver, over all that could hide some of the light from it, tells how
+    /// wide the penumbra is; then as many comparisons over that width. Maps must tell how far casters lie:
+    /// [`Options::keeps_casters`](crate::Options::keeps_casters).
+    Pcss {
+        /// n² comparisons in the search, and as many in the penumbra; clamped to 1 ..= [`MAX_DISC`](Self::MAX_DISC).
+        n: u32,
+        /// Diameter of the light: of a lamp in metres, of the sun per metre of distance (twice the tangent of half its angle: 0.0093 for ours).
+        source: f32,
     },
     /// Numbers in place of depths, filtered ahead of lookup.
     Prefiltered(Prefilter),
+}
+
+/// Where comparisons are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pattern {
+    /// On an even grid of n × n places in a square.
+    #[default]
+    Grid,
+    /// At n² places in a disc, none near another, without an order that shows as bands.
+    Poisson,
+}
+
+impl Pattern {
+    /// Place k of n², where the square's side and the disc's diameter is 1.
+    fn place(self, k: u32, n: u32) -> [f64; 2] {
+        match self {
+            Self::Grid => [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n) - 0.5),
+            Self::Poisson => disc::PLACES[k as usize % disc::MAX_PLACES].map(f64::from),
+        }
+    }
 }
 
 /// The texels of a map, for lookups. A function from (i, j) to depth is one: it is asked for as many depths as a filter needs.
@@ -110,6 +142,14 @@ impl Filter {
     /// Widest box of [`Pcf`](Self::Pcf), texels.
     pub const MAX_PCF: u32 = 15;
 
+    /// The most comparisons to each side over a disc: n² of them.
+    pub const MAX_DISC: u32 = 8;
+
+    /// The first `count` places of [`Pattern::Poisson`] in a disc of diameter 1 around 0, at most n² for n = [`MAX_DISC`](Self::MAX_DISC).
+    pub fn disc_places(count: u32) -> &'static [[f32; 2]] {
+        &disc::PLACES[..(count as usize).min(disc::MAX_PLACES)]
+    }
+
     /// Percentage-closer filtering over `n` × `n` texels.
     ///
     /// # Errors
@@ -126,7 +166,7 @@ impl Filter {
         match self {
             Self::Hard => 0,
             Self::Pcf { n } => n.clamp(1, Self::MAX_PCF) / 2 + 1,
-            Self::Spread { .. } => SPREAD_REACH,
+            Self::Spread { .. } | Self::Pcss { .. } => SPREAD_REACH,
             Self::Prefiltered(prefilter) => prefilter.reach_texels(),
         }
     }
@@ -154,10 +194,27 @@ impl Filter {
         match self {
             Self::Hard => Ok(()),
             Self::Pcf { n } => Self::pcf(*n).map(drop),
-            Self::Spread { n, width } => Self::pcf(*n).and_then(|_| width.check()),
+            Self::Spread { n, width, pattern } => {
+                if *pattern == Pattern::Poisson {
+                    check_disc(*n)?;
+                }
+                Self::pcf(*n).and_then(|_| width.check())
+            }
+            Self::Pcss { n, source } => {
+                check(*source > 0.0 && *source <= 1e6, "filter.source", || {
+                    format!("must be above 0 and at most 1e6, is {source}")
+                })?;
+                check_disc(*n)
+            }
             Self::Prefiltered(prefilter) => prefilter.check(),
         }
     }
+}
+
+fn check_disc(n: u32) -> Result<(), Error> {
+    check((1..=Filter::MAX_DISC).contains(&n), "filter.n", || {
+        format!("must be 1 to {} where comparisons lie in a disc, is {n}", Filter::MAX_DISC)
+    })
 }
 
 /// As in a shadow specification: `hard`, `pcf5`, `csm8`.
@@ -166,7 +223,11 @@ impl fmt::Display for Filter {
         match self {
             Self::Hard => f.write_str("hard"),
             Self::Pcf { n } => write!(f, "pcf{n}"),
-            Self::Spread { n, width } => write!(f, "pcf{n}(blur={width})"),
+            Self::Spread { n, width, pattern: Pattern::Grid } => write!(f, "pcf{n}(blur={width})"),
+            Self::Spread { n, width, pattern: Pattern::Poisson } => {
+                write!(f, "pcf{n}(blur={width},poisson)")
+            }
+            Self::Pcss { .. } => f.write_str("pcss"),
             Self::Prefiltered(prefilter) => prefilter.statistic.fmt(f),
         }
     }
@@ -212,22 +273,38 @@ pub fn visibility(
             let row_sum = |j| columns.sum(|i| f64::from(u8::from(is_lit(i, j))));
             (rows.sum(row_sum) / f64::from(n * n)) as f32
         }
-        Filter::Spread { n, width } => {
-            let n = n.clamp(1, Filter::MAX_PCF);
-            let [low, high] = drawn(map, filter);
-            // The sides of the square, as they lie in the map.
-            let [ss, tt, st] = width.metric(receiver);
-            let across = ss.max(1.0).sqrt();
-            let shear = st / across;
-            let along = (tt - shear * shear).max(1.0).sqrt();
-            let at = |k: u32| (f64::from(k) + 0.5) / f64::from(n) - 0.5;
+        Filter::Spread { n, width, pattern } => {
+            let max = if pattern == Pattern::Grid { Filter::MAX_PCF } else { Filter::MAX_DISC };
+            let n = n.clamp(1, max);
+            let place = |offset| nearest(texel + offset, drawn(map, filter));
             let mut lit = 0;
-            for v in (0..n).map(at) {
-                for u in (0..n).map(at) {
-                    let offset = DVec2::new(across * u, shear * u + along * v);
-                    let [i, j] = (texel + offset).clamp(low, high).floor().to_array();
-                    lit += u32::from(is_lit(i as i32, j as i32));
+            for offset in offsets(width.metric(receiver), pattern, n) {
+                let [i, j] = place(offset);
+                lit += u32::from(is_lit(i, j));
+            }
+            (f64::from(lit) / f64::from(n * n)) as f32
+        }
+        Filter::Pcss { n, source } => {
+            let n = n.clamp(1, Filter::MAX_DISC);
+            let across = |width: f64| receiver.texel_metric.map(|m| m * width * width);
+            let place = |offset| nearest(texel + offset, drawn(map, filter));
+            let penumbra = |st, depth| f64::from(source) * map.penumbra(receiver, st, depth);
+            // What hides some of the light lies between here and it, where the map's depths begin at the latest.
+            let (mut widths, mut hidden) = (0.0, 0u32);
+            for offset in offsets(across(penumbra(st, 0.0)), Pattern::Poisson, n) {
+                let [i, j] = place(offset);
+                if !is_lit(i, j) {
+                    widths += penumbra(test.center(i, j), f64::from(texels.depth(i, j)));
+                    hidden += 1;
                 }
+            }
+            if hidden == 0 {
+                return 1.0;
+            }
+            let mut lit = 0;
+            for offset in offsets(across(widths / f64::from(hidden)), Pattern::Poisson, n) {
+                let [i, j] = place(offset);
+                lit += u32::from(is_lit(i, j));
             }
             (f64::from(lit) / f64::from(n * n)) as f32
         }
@@ -249,6 +326,23 @@ fn drawn(map: &ShadowMap, filter: Filter) -> [DVec2; 2] {
     [low, low + DVec2::new(width, height) - 1e-3]
 }
 
+/// The texel around a place, of those that are drawn.
+fn nearest(place: DVec2, [low, high]: [DVec2; 2]) -> [i32; 2] {
+    place.clamp(low, high).floor().to_array().map(|i| i as i32)
+}
+
+/// Places of a pattern over a width of this metric (squares of the texels in s and t, and their product), or over a texel where that is wider.
+fn offsets([ss, tt, st]: [f64; 3], pattern: Pattern, n: u32) -> impl Iterator<Item = DVec2> {
+    // The sides of the square, as they lie in the map.
+    let across = ss.max(1.0).sqrt();
+    let shear = st / across;
+    let along = (tt - shear * shear).max(1.0).sqrt();
+    (0..n * n).map(move |k| {
+        let [u, v] = pattern.place(k, n);
+        DVec2::new(across * u, shear * u + along * v)
+    })
+}
+
 /// A receiver against the texels of a map.
 struct Test<'a> {
     map: &'a ShadowMap,
@@ -262,13 +356,16 @@ impl<'a> Test<'a> {
         Self { map, receiver, slack: receiver.half_texel + HALF_ULP }
     }
 
+    /// The middle of texel (i, j), (s, t).
+    fn center(&self, i: i32, j: i32) -> DVec2 {
+        let [width, height] = self.map.resolution.map(f64::from);
+        let t = self.map.rows.t_from_row((f64::from(j) + 0.5) / height);
+        DVec2::new((f64::from(i) + 0.5) / width, t)
+    }
+
     /// The depth from which on texel (i, j) does not hide the receiver.
     fn nearest_lit(&self, i: i32, j: i32) -> f64 {
-        let [width, height] = self.map.resolution.map(f64::from);
-        let center = DVec2::new(
-            (f64::from(i) + 0.5) / width,
-            self.map.rows.t_from_row((f64::from(j) + 0.5) / height),
-        );
+        let center = self.center(i, j);
         let depth = self.receiver.depth;
         // An edge-on receiver's infinite slope makes the rise infinite or NaN. `min` ignores NaN.
         let rise = self.receiver.slope.dot(center - self.receiver.st);

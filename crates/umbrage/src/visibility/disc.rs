@@ -1,0 +1,78 @@
+//! Places in a disc, none near another.
+
+/// The most places that there are.
+pub(super) const MAX_PLACES: usize = 64;
+
+/// Poisson-disc places in the disc of diameter 1 around 0: each is, of a number of random candidates, the one farthest from all before it (Mitchell 1991), so
+/// that the first n of them are spread evenly for every n.
+pub(super) const PLACES: [[f32; 2]; MAX_PLACES] = places();
+
+/// Candidates for each place.
+const CANDIDATES: usize = 24;
+
+const fn places() -> [[f32; 2]; MAX_PLACES] {
+    let mut places = [[0f32; 2]; MAX_PLACES];
+    let mut seed = 20_261_125u32;
+    let mut n = 0;
+    while n < MAX_PLACES {
+        let mut farthest = -1.0;
+        let mut candidate = 0;
+        while candidate < CANDIDATES {
+            let mut at = [0.0; 2];
+            let mut axis = 0;
+            while axis < 2 {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                at[axis] = (seed >> 8) as f32 / (1 << 24) as f32 - 0.5;
+                axis += 1;
+            }
+            if at[0] * at[0] + at[1] * at[1] > 0.25 {
+                continue;
+            }
+            candidate += 1;
+            let mut nearest = 1.0;
+            let mut i = 0;
+            while i < n {
+                let [x, y] = [at[0] - places[i][0], at[1] - places[i][1]];
+                let distance = x * x + y * y;
+                if distance < nearest {
+                    nearest = distance;
+                }
+                i += 1;
+            }
+            if nearest > farthest {
+                farthest = nearest;
+                places[n] = at;
+            }
+        }
+        n += 1;
+    }
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_keep_their_distance_and_fill_the_disc() {
+        for n in [4, 9, 25, 64] {
+            let places = &PLACES[..n];
+            let mut mean = [0.0; 2];
+            let mut square = 0.0;
+            for (i, &[x, y]) in places.iter().enumerate() {
+                assert!(x.hypot(y) <= 0.5);
+                // Discs of this diameter around n places take up a quarter of the area.
+                let least = 0.5 / (n as f32).sqrt();
+                for &[u, v] in &places[..i] {
+                    assert!((x - u).hypot(y - v) > least, "{n}: {x} {y}, {u} {v}");
+                }
+                mean[0] += x / n as f32;
+                mean[1] += y / n as f32;
+                square += (x * x + y * y) / n as f32;
+            }
+            assert!(mean[0].hypot(mean[1]) < 0.2 / (n as f32).sqrt(), "{n}: {mean:?}");
+            // 1/8 in the mean over the disc.
+            assert!((square - 0.125).abs() < 0.25 / n as f32 + 0.02, "{n}: {square}");
+        }
+    }
+}
