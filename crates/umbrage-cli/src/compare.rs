@@ -3,6 +3,7 @@
 use crate::args;
 use crate::comparison::{Comparison, Stage};
 use crate::execute::Execution;
+use crate::motion::Motion;
 use crate::output::{Contents, ReportFolder, aligned, command_line, note, print};
 use crate::pixels::NOTHING_TO_SHADOW;
 use crate::progress::Progress;
@@ -23,7 +24,11 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     tell_notices(&scene);
     execution.announce();
     let rows_in_motion = u64::from(args.frames) * u64::from(args.view.size[1]);
-    let moving = args.motion.map_or(0, |_| rows_in_motion);
+    let moving = match args.motion {
+        None => 0,
+        Some(Motion::Away) => 2 * rows_in_motion,
+        Some(_) => rows_in_motion,
+    };
     let progress = Progress::new(comparison.rows() + moving, quiet);
     let mut compared = comparison.trace(&progress)?;
     if let Some(motion) = args.motion {
@@ -47,7 +52,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 
 fn table(report: &Report) -> String {
     type Column = (&'static str, fn(&Measured) -> String);
-    const COLUMNS: [Column; 16] = [
+    const COLUMNS: [Column; 17] = [
         ("shadows", |r| r.shadows.clone()),
         ("maps", |r| r.maps.to_string()),
         ("texels", |r| r.texels.to_string()),
@@ -57,6 +62,7 @@ fn table(report: &Report) -> String {
         ("mean error", |r| number(r.metrics.mean_abs_error, 4)),
         ("FLIP", |r| number(r.metrics.flip, 4)),
         ("flicker", |r| percent(r.flicker)),
+        ("noise", |r| number(r.noise, 4)),
         ("px/texel 50%", |r| number(r.error_px.p50, 2)),
         ("95%", |r| number(r.error_px.p95, 2)),
         ("max", |r| number(r.error_px.max, 1)),
@@ -65,7 +71,11 @@ fn table(report: &Report) -> String {
         ("depth ms", |r| number(r.ms.depth, 0)),
         ("shade ms", |r| number(r.ms.shade, 0)),
     ];
-    let is_measured = |name: &str| name != "flicker" || report.motion.is_some();
+    let is_measured = |name: &str| match name {
+        "flicker" => report.motion.is_some(),
+        "noise" => report.results.iter().any(|r| r.noise.is_some()),
+        _ => true,
+    };
     let columns = || COLUMNS.iter().filter(|(name, _)| is_measured(name));
     let mut rows: Vec<Vec<String>> = vec![columns().map(|(name, _)| (*name).to_owned()).collect()];
     rows.extend(report.results.iter().map(|r| columns().map(|(_, text)| text(r)).collect()));

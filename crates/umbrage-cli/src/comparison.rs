@@ -2,7 +2,7 @@
 
 use crate::args;
 use crate::execute::{Execution, Executor, Sets};
-use crate::motion::{Motion, Scenery, flicker};
+use crate::motion::{Motion, Scenery, flicker, noise};
 use crate::pixels::{self, Rows, Shadowed, Texels, casters, casters_culled, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker};
@@ -54,6 +54,7 @@ struct Contender<'a> {
     plan: &'a Plan,
     executor: Executor<'a>,
     flicker: Option<f64>,
+    noise: Option<f64>,
     ms: Times,
     shadowed: Shadowed,
     texels: Texels,
@@ -145,6 +146,7 @@ impl<'a> Comparison<'a> {
                 plan,
                 executor,
                 flicker: None,
+                noise: None,
                 ms: Times { plan: Some(*ms), depth: Some(milliseconds(start)), ..Times::default() },
                 shadowed: Shadowed::default(),
                 texels: Texels::default(),
@@ -161,7 +163,7 @@ impl Compared<'_> {
         self.truth.counted.contains(&true)
     }
 
-    /// Measures how much every technique flickers in a motion.
+    /// Measures how much every technique flickers in a motion, and how much it sparkles on the way away.
     pub(crate) fn move_on(
         &mut self,
         motion: Motion,
@@ -179,6 +181,12 @@ impl Compared<'_> {
         let flicker = flicker(motion, frames, &scenery, &options.shadows, progress)?;
         for (contender, flicker) in self.contenders.iter_mut().zip(flicker) {
             contender.flicker = flicker;
+        }
+        if motion == Motion::Away {
+            let noise = noise(motion, frames, &scenery, &options.shadows, progress)?;
+            for (contender, noise) in self.contenders.iter_mut().zip(noise) {
+                contender.noise = noise.mean;
+            }
         }
         self.motion = Some(umbrage_measure::Motion { kind: motion.name().to_owned(), frames });
         Ok(())
@@ -299,6 +307,7 @@ impl Contender<'_> {
             storage_factor: Some(self.plan.storage_factor()),
             casters_culled: casters_culled(self.plan, &casters(self.plan, scene)),
             flicker: self.flicker,
+            noise: self.noise,
             ms: self.ms,
         };
         Ok((measured, pictures))

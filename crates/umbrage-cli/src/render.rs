@@ -2,14 +2,15 @@
 
 use crate::args::{self, Aov, PictureKind};
 use crate::execute::{Execution, Sets};
+use crate::motion::{Motion, Scenery, noise};
 use crate::output::{check_file, note};
 use crate::pixels::{self, NOTHING_TO_SHADOW, Rows, Shadowed, Shape, Texels};
 use crate::progress::Progress;
-use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
+use crate::setup::{Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use umbrage::Size;
 use umbrage_measure::{
-    ErrorScale, Image, Rgb, difference_map, error_map, grey, partition_map, texel_map, write_exr,
+    ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map, write_exr,
     write_png,
 };
 use umbrage_trace::{View, shade};
@@ -22,14 +23,18 @@ struct Layers {
     technique: Shadowed,
     texels: Texels,
     shape: Shape,
+    noise: Vec<f32>,
 }
+
+/// Frames of the motion that shows minification.
+const FRAMES: u32 = 8;
 
 /// Renders, and writes the picture.
 pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let kind = args.picture_kind()?;
     check_file(&args.output)?;
     let scene = open_scene(&args.scene.name)?;
-    let camera = onlooker(&args.view, Some(&scene))?.camera;
+    let Onlooker { camera, look, .. } = onlooker(&args.view, Some(&scene))?;
     let light = lamp(&args.light, Some(&scene))?.light;
     let execution = Execution::open(&args.execution, std::slice::from_ref(&args.shadows))?;
     let sets = Sets::new(&scene, &execution, args.scene.opaque)?;
@@ -41,7 +46,12 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let needs_map = !matches!(args.aov, Aov::Truth | Aov::Depth | Aov::Normal);
     let height = u64::from(camera.image()[1]);
     let map_rows = if needs_map { sets.rows(&plan, &args.shadows) } else { 0 };
-    let passes = 1 + u64::from(needs_truth) + u64::from(needs_map);
+    let moves = args.aov == Aov::Minification;
+    if moves {
+        Motion::Away.check(FRAMES, look, light)?;
+    }
+    let moving = if moves { u64::from(FRAMES) } else { 0 };
+    let passes = 1 + u64::from(needs_truth) + u64::from(needs_map) + moving;
     tell_notices(&scene);
     execution.announce();
     if let Size::MaxError(pixels) = args.shadows.options.size
@@ -77,6 +87,16 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
             layers.texels.push(strip);
         }
         layers.shape.push(strip.as_ref().unwrap_or(shape));
+    }
+    if moves {
+        let bounds = &receivers.bounds();
+        let scenery = Scenery { sets: &sets, bounds, look, light, samples: 1 };
+        let technique = std::slice::from_ref(&args.shadows);
+        let noise = noise(Motion::Away, FRAMES, &scenery, technique, &progress)?.swap_remove(0);
+        layers.noise = noise.pixels;
+        if let Some(mean) = noise.mean {
+            note(&format!("noise: {mean:.4} (mean change of a pixel's error between frames)"));
+        }
     }
     drop(progress);
     if (needs_map || needs_truth) && !layers.counted.contains(&true) {
@@ -117,6 +137,9 @@ impl Layers {
             Aov::Partition => {
                 partition_map(&Image::new(size, self.texels.map)?, &rgb(self.technique.color)?)?
             }
+            Aov::Minification => {
+                noise_map(&Image::new(size, self.noise)?, &rgb(self.technique.color)?)?
+            }
             Aov::Depth => {
                 let color = |&d: &f32| shade::depth_color(view.camera(), f64::from(d));
                 rgb(self.shape.depth.iter().map(color).collect())?
@@ -149,6 +172,7 @@ impl Layers {
                 )
             }
             Aov::Error => plane(self.texels.error),
+            Aov::Minification => plane(self.noise),
             Aov::Depth => plane(self.shape.depth),
             Aov::Partition => {
                 plane(self.texels.map.iter().map(|m| m.map_or(-1.0, f32::from)).collect())

@@ -28,7 +28,7 @@ pub use color::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS};
 pub use error::Error;
 pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_png};
 pub use image::{Image, Rgb};
-pub use maps::{difference_map, error_map, grey, partition_map, texel_map};
+pub use maps::{difference_map, error_map, grey, noise_map, partition_map, texel_map};
 pub use metrics::{ErrorPx, Metrics, measure, measure_error_px, worst_spot};
 pub use page::{
     FigureFile, FigureShown, FiguresPage, Page, SweepPage, write_figures, write_report, write_sweep,

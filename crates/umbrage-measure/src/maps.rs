@@ -56,6 +56,20 @@ pub fn error_map(
     })
 }
 
+/// How much pixels sparkle, over the dimmed `picture`: [`FALSE_LIGHT`], as opaque as four times the noise, so that what changes by a quarter from frame to
+/// frame is solid. NaN: dimmed further.
+///
+/// # Errors
+/// Sizes that differ.
+pub fn noise_map(noise: &Image<f32>, picture: &Image<Rgb>) -> Result<Image<Rgb>, Error> {
+    picture.check_like(noise, "picture")?;
+    Image::from_fn(noise.size(), |x, y| {
+        let noise = *noise.at(x, y);
+        let below = dimmed(*picture.at(x, y), !noise.is_nan());
+        if noise.is_nan() { below } else { mix(below, FALSE_LIGHT, 4.0 * noise) }
+    })
+}
+
 /// Which map of a plan serves each pixel: the dimmed `picture` tinted by the map's index in
 /// [`PARTITIONS`], which repeats. `None`: no map; only dimmed.
 ///

@@ -131,6 +131,10 @@ pub struct Measured {
     /// not change; for hard shadows the share that changes. `None` if nothing moved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flicker: Option<f64>,
+    /// Mean change, from one frame to the next, of a pixel's error against the mean of many true values all over it: 0 where pixels do not sparkle. `None` if
+    /// it was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
     /// Wall-clock times.
     pub ms: Times,
 }
@@ -205,6 +209,7 @@ pub(crate) mod tests {
             storage_factor: Some(865.16),
             casters_culled: Some(0.25),
             flicker: None,
+            noise: None,
             ms: Times { plan: Some(0.004), depth: Some(812.5), filter: None, shade: Some(95.25) },
         };
         Report {

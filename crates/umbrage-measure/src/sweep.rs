@@ -286,6 +286,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             storage_factor,
             casters_culled,
             flicker: _,
+            noise: _,
             ms: _,
         } = measured;
         Self {

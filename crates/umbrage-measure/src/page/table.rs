@@ -93,6 +93,12 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
             "Mean change of visibility between frames where the truth does not change",
             |r| r.flicker,
         ))),
+        rare(column(
+            "Noise",
+            "0–1",
+            "Mean change of a pixel's error between frames, against supersampled truth",
+            |r| r.noise,
+        )),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
         whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
         rare(whole(column("Memory", "KiB", "What lookup reads of the maps", |r| {

@@ -251,6 +251,7 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
             r.casters_culled.map(|share| format!("{} %", significant(share * 100.0))),
         ),
         ("Flicker", r.flicker.map(|share| format!("{} %", significant(share * 100.0)))),
+        ("Noise", known(r.noise)),
         ("Maps", Some(count(u64::from(r.maps)))),
         ("Texels", Some(count(r.texels))),
         ("Memory", r.bytes.map(|b| format!("{} KiB", count(b.div_ceil(1024))))),
