@@ -10,8 +10,8 @@ use crate::setup::{Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices
 use anyhow::{Context, Result};
 use umbrage::Size;
 use umbrage_measure::{
-    ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map, write_exr,
-    write_png,
+    ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
+    write_exr, write_png,
 };
 use umbrage_trace::{View, shade};
 

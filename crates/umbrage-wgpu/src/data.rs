@@ -173,30 +173,17 @@ pub(crate) struct PrefilterMap {
     pub(crate) beam_scale: Vec4,
     pub(crate) slab: Vec4,
     pub(crate) origin: [f32; 2],
-    pub(crate) low: [i32; 2],
-    pub(crate) high: [i32; 2],
     pub(crate) first_layer: u32,
     pub(crate) padding: u32,
 }
 
 impl PrefilterMap {
-    /// A map whose numbers take `textures` layers, the largest of them at a level.
-    pub(crate) fn new(
-        map: &ShadowMap,
-        place: &Place,
-        filter: &Filter,
-        textures: u32,
-        level: u32,
-    ) -> Self {
-        let low = place.origin.map(|n| (n as i32 - filter.reach_texels() as i32) >> level);
-        let drawn = filter.drawn_texels(place.size).map(|n| n >> level);
-        let high = [0, 1].map(|i| low[i] + drawn[i] as i32 - 1);
+    /// A map whose numbers take `textures` layers.
+    pub(crate) fn new(map: &ShadowMap, place: &Place, textures: u32) -> Self {
         Self {
             beam_scale: beam_scale(map),
             slab: slab(map),
             origin: place.origin.map(|n| n as f32),
-            low,
-            high,
             first_layer: place.layer * textures,
             padding: 0,
         }

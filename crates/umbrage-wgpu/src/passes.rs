@@ -153,14 +153,21 @@ fn begin<'e>(
 
 /// Sets viewport and scissor to all that is drawn for a map.
 fn aim(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter) {
-    aim_level(pass, place, filter, 0);
+    aim_level(pass, place, filter, 0, [0; 2]);
 }
 
-/// The same in a copy that is 2^`level` times smaller.
-pub(crate) fn aim_level(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter, level: u32) {
+/// The same in a copy that is 2^`level` times smaller, without so many texels at the sides.
+pub(crate) fn aim_level(
+    pass: &mut RenderPass<'_>,
+    place: &Place,
+    filter: &Filter,
+    level: u32,
+    inset: [u32; 2],
+) {
     let gutter = filter.reach_texels();
-    let [x, y] = place.origin.map(|n| (n - gutter) >> level);
-    let [w, h] = filter.drawn_texels(place.size).map(|n| n >> level);
+    let drawn = filter.drawn_texels(place.size);
+    let [x, y] = [0, 1].map(|i| ((place.origin[i] - gutter) >> level) + inset[i]);
+    let [w, h] = [0, 1].map(|i| (drawn[i] >> level) - 2 * inset[i]);
     pass.set_viewport(x as f32, y as f32, w as f32, h as f32, 0.0, 1.0);
     pass.set_scissor_rect(x, y, w, h);
 }

@@ -33,7 +33,8 @@ pub(crate) struct Prefiltering {
     /// Of what is stored, the map itself being level 0.
     first_level: u32,
     levels: u32,
-    is_blurred: bool,
+    /// How far the blur reaches to each side, texels of what is stored.
+    radius: u32,
     encode: Vec<RenderPipeline>,
     rows: Vec<RenderPipeline>,
     columns: Vec<RenderPipeline>,
@@ -130,7 +131,8 @@ impl Prefiltering {
             };
             groups.iter().map(one).collect()
         };
-        let is_blurred = prefilter.radius_texels() > 0;
+        let radius = prefilter.radius_texels();
+        let is_blurred = radius > 0;
         let first_level = prefilter.first_level();
         let levels = prefilter.levels();
         let blur = |pass| if is_blurred { pipelines(pass) } else { Vec::new() };
@@ -154,7 +156,7 @@ impl Prefiltering {
             format,
             first_level,
             levels,
-            is_blurred,
+            radius,
             halve: if levels > 1 { pipelines(PrefilterPass::Halve) } else { Vec::new() },
             encode: pipelines(PrefilterPass::Encode),
             rows: blur(PrefilterPass::Rows),
@@ -187,7 +189,7 @@ impl Prefiltering {
         let numbers = |levels| {
             Numbers::new(device, support, self.format, depths, size, self.textures, levels)
         };
-        self.scratch = self.is_blurred.then(|| numbers(1));
+        self.scratch = (self.radius > 0).then(|| numbers(1));
         self.numbers = numbers(self.levels);
         self.rebind(device, depths);
     }
@@ -211,7 +213,6 @@ impl Prefiltering {
         queue: &Queue,
         plan: &Plan,
         records: &[Record],
-        filter: &Filter,
         depths: &DepthTexture,
     ) {
         let stride = self.stride as usize;
@@ -220,8 +221,7 @@ impl Prefiltering {
         let maps = plan.maps.iter().zip(records).zip(self.bytes.chunks_exact_mut(stride));
         for ((map, record), bytes) in maps {
             if let Some(place) = record.place {
-                let uniform =
-                    PrefilterMap::new(map, &place, filter, self.textures, self.first_level);
+                let uniform = PrefilterMap::new(map, &place, self.textures);
                 bytes[..size_of::<PrefilterMap>()].copy_from_slice(bytemuck::bytes_of(&uniform));
             }
         }
@@ -244,19 +244,21 @@ impl Prefiltering {
     ) {
         let numbers = &self.numbers.layers;
         let Bindings { depths, numbers: sources, scratch: blurred } = &self.bindings;
-        // Pipelines, what they read, draw into, and at which level.
-        let mut steps = vec![(&self.encode, &depths[layer], &numbers[0], 0)];
+        // Pipelines, what they read, draw into, at which level, and what is left out at the sides, where a blur would read beyond what is drawn. Lookups do not
+        // reach there.
+        let radius = self.radius;
+        let mut steps = vec![(&self.encode, &depths[layer], &numbers[0], 0, [0; 2])];
         if let (Some(scratch), Some(blurred)) = (&self.scratch, blurred) {
-            steps.push((&self.rows, &sources[0], &scratch.layers[0], 0));
-            steps.push((&self.columns, blurred, &numbers[0], 0));
+            steps.push((&self.rows, &sources[0], &scratch.layers[0], 0, [radius, 0]));
+            steps.push((&self.columns, blurred, &numbers[0], 0, [radius; 2]));
         }
         for level in 1..self.levels {
             let from = &sources[level as usize - 1];
-            steps.push((&self.halve, from, &numbers[level as usize], level));
+            steps.push((&self.halve, from, &numbers[level as usize], level, [0; 2]));
         }
         let passes = steps.len() * self.groups.len();
         let mut index = 0;
-        for (pipelines, bindings, target, level) in steps {
+        for (pipelines, bindings, target, level, inset) in steps {
             for (pipeline, range) in pipelines.iter().zip(&self.groups) {
                 let first = layer * self.textures as usize;
                 let attachments: Vec<_> =
@@ -273,7 +275,7 @@ impl Prefiltering {
                 });
                 pass.set_pipeline(pipeline);
                 for (map, place) in stale.clone() {
-                    aim_level(&mut pass, &place, filter, self.first_level + level);
+                    aim_level(&mut pass, &place, filter, self.first_level + level, inset);
                     pass.set_bind_group(0, bindings, &[map as u32 * self.stride]);
                     pass.draw(0..3, 0..1);
                 }

@@ -427,7 +427,7 @@ impl Shadows {
             self.casters.upload(device, queue, &self.records);
             let Self { records, texture, prefiltering, .. } = &mut *self;
             if let Some(prefiltering) = prefiltering {
-                prefiltering.upload(device, queue, plan, records, &filter, texture);
+                prefiltering.upload(device, queue, plan, records, texture);
             }
         }
         Ok(Prepared { shadows: self, plan, render_origin })

@@ -107,6 +107,7 @@ fn prefiltered(prefilter: &Prefilter, layout: Layout) -> String {
             .replace("{SAMPLE_VARIANCE}", &number(Footprint::SAMPLE_VARIANCE as f32))
             .replace("{LEAST_VARIANCE}", &number(Footprint::LEAST_VARIANCE as f32))
             .replace("{ANISOTROPY_SQUARED}", &number(Footprint::ANISOTROPY.powi(2) as f32))
+            .replace("{KEPT_VARIANCE}", &number(Footprint::KEPT_VARIANCE as f32))
             .replace("{MAX_SAMPLES}", &number(Footprint::MAX_SAMPLES as f32))
             .replace(
                 "{LAST_LEVEL}",
@@ -220,11 +221,11 @@ pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range
         }
     });
     let values = values.collect::<Vec<_>>().join(", ");
-    let direction = if pass == PrefilterPass::Rows { "1, 0" } else { "0, 1" };
     let weights: Vec<f32> = prefilter.weights().collect();
     let taps = weights.iter().enumerate().skip(1).map(|(k, w)| {
         let tap = |sign| {
-            let at = format!("clamp(at {sign} {k} * direction, low, high)");
+            let step = if pass == PrefilterPass::Rows { [k, 0] } else { [0, k] };
+            let at = format!("at {sign} vec2i({}, {})", step[0], step[1]);
             format!("textureLoad(shadow_prefilter_source, {at}, layer, 0)")
         };
         format!("    sum += {w:?} * ({} + {});", tap("-"), tap("+"))
@@ -236,7 +237,6 @@ pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range
     .replace("{TEXTURES}", &textures(&prefilter.statistic).to_string())
     .replace("{OUTPUTS}", &outputs)
     .replace("{VALUES}", &values)
-    .replace("{DIRECTION}", direction)
     .replace("{WEIGHT_0}", &number(weights[0]))
     .replace("{TAPS}", &taps.collect::<Vec<_>>().join("\n"));
     if is_encode { statistic(&prefilter.statistic) + &text } else { text }
@@ -470,8 +470,6 @@ mod tests {
             offset_of!(data::PrefilterMap, beam_scale),
             offset_of!(data::PrefilterMap, slab),
             offset_of!(data::PrefilterMap, origin),
-            offset_of!(data::PrefilterMap, low),
-            offset_of!(data::PrefilterMap, high),
             offset_of!(data::PrefilterMap, first_layer),
         ];
         assert_eq!(members.iter().map(|m| m.1).collect::<Vec<_>>(), ours);

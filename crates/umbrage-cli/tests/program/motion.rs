@@ -1,7 +1,7 @@
 //! `compare --motion`: shadows that change from frame to frame where the truth does not.
 
 use crate::bad_input::refuses;
-use crate::desk::{Desk, STAGE_GLTF};
+use crate::desk::{Desk, STAGE_GLTF, shared_scene};
 use serde_json::{Value, json};
 
 const TECHNIQUES: [&str; 8] = [
@@ -99,7 +99,7 @@ fn motions_that_cannot_be() {
         (&["--motion", "orbit", "--frames", "1"], "--frames <N>': 1 is not in 2..=1000"),
         (&["--motion", "orbit", "--frames", "1001"], "2..=1000"),
         (&["--motion", "orbit", "--frames", "many"], "--frames"),
-        (&["--motion", "spin"], "[possible values: dolly, orbit, sun]"),
+        (&["--motion", "spin"], "[possible values: dolly, orbit, sun, away]"),
         (&["--motion"], "--motion"),
     ] {
         refuses(&desk, &[&small[..], options].concat(), expected);
@@ -109,4 +109,65 @@ fn motions_that_cannot_be() {
     // What does not move at all may be asked for: this torch points straight down.
     let torch = [&small[..], &["--json", "--light", "torch", "--motion", "sun"]].concat();
     assert_eq!(desk.json(&torch)["results"][0]["flicker"], 0.0);
+}
+
+/// A forest far away, where many texels fall into a pixel (Annen et al. 2007, Fig. 10): numbers filtered as wide as the pixel sparkle a third of what bilinear
+/// comparisons do at most.
+#[test]
+fn filtered_numbers_do_not_sparkle_where_comparisons_do() {
+    let desk = Desk::new();
+    let forest = shared_scene("trees/forest_eztree.glb");
+    let report = desk.json(&[
+        "compare",
+        &forest,
+        "-o",
+        "report",
+        "--json",
+        "--size",
+        "240x135",
+        "--eye",
+        "-178,178,400",
+        "--target",
+        "0,16,-4",
+        "--near",
+        "50",
+        "--far",
+        "900",
+        "--motion",
+        "away",
+        "--frames",
+        "4",
+        "--shadows",
+        "uniform:pcf2@2048",
+        "--shadows",
+        "uniform:csm8(blur=1.5px)@2048",
+    ]);
+    let noise = |i: usize| report["results"][i]["noise"].as_f64().unwrap();
+    assert!(noise(0) > 0.02 && noise(1) < noise(0) / 3.0, "{} {}", noise(0), noise(1));
+}
+
+#[test]
+fn noise_has_a_picture() {
+    let desk = Desk::new();
+    let render = |technique: &str| {
+        let said = desk.run(&[
+            "render",
+            "grove",
+            "-o",
+            "noise.exr",
+            "--aov",
+            "minification",
+            "--size",
+            "96x54",
+            "--shadows",
+            technique,
+        ]);
+        let text = said.stderr;
+        let line =
+            text.lines().find(|l| l.starts_with("noise: ")).unwrap_or_else(|| panic!("{text}"));
+        line.split(' ').nth(1).unwrap().parse::<f64>().unwrap()
+    };
+    let [hard, soft] = [render("uniform@512"), render("uniform:csm8(blur=2px)@512")];
+    assert!(soft < hard, "{soft} {hard}");
+    assert!(desk.path("noise.exr").exists());
 }

@@ -14,7 +14,8 @@ mod bare;
 use bare::BareDepth;
 use std::path::PathBuf;
 use std::time::Instant;
-use umbrage::visibility::Filter;
+use umbrage::visibility::statistic::{Csm, Statistic};
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 use umbrage::{Bounds, Camera, Light, LookAt, Options, Partition, Plan, Planner, Size, Warp};
 use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
 use umbrage_scene::Scene;
@@ -37,7 +38,7 @@ struct Set<'a> {
 }
 
 impl<'a> Set<'a> {
-    fn new(gpu: &'a Gpu, scene: &'a Scene) -> Result<Self, Failure> {
+    fn new(gpu: &'a Gpu, scene: &'a Scene, image: [u32; 2]) -> Result<Self, Failure> {
         let v = scene.default_view();
         let camera = Camera::look_at(LookAt {
             eye: v.eye,
@@ -46,7 +47,7 @@ impl<'a> Set<'a> {
             fov_y_rad: v.fov_y_rad,
             near: v.near,
             far: v.far,
-            image: [960, 540],
+            image,
         })?;
         let boxes = Tracer::new(scene)?.boxes(256);
         let light = scene.default_light().light;
@@ -54,19 +55,20 @@ impl<'a> Set<'a> {
     }
 
     fn plan(&self, warp: Warp, slices: u32, side: u64) -> Result<Plan, Failure> {
-        let options = Options {
-            warp,
-            partition: Partition::slices(slices),
-            size: Size::Budget(side * side),
-            ..Options::default()
-        };
+        let size = Size::Budget(side * side);
+        self.plan_sized(warp, slices, size)
+    }
+
+    fn plan_sized(&self, warp: Warp, slices: u32, size: Size) -> Result<Plan, Failure> {
+        let partition = Partition::slices(slices);
+        let options = Options { warp, partition, size, ..Options::default() };
         let bounds =
             Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
         Ok(Planner::new().plan(&self.camera, &[self.light], &bounds, &options)?.clone())
     }
 
-    fn renderer(&self) -> Result<Renderer<'_, 'a>, Failure> {
-        let options = ShadowOptions { filter: Filter::pcf(3)?, ..ShadowOptions::default() };
+    fn renderer(&self, filter: Filter) -> Result<Renderer<'_, 'a>, Failure> {
+        let options = ShadowOptions { filter, ..ShadowOptions::default() };
         Ok(Renderer::new(self.gpu, &self.buffers, &options)?)
     }
 
@@ -113,7 +115,8 @@ fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     let [uniform, lispsm, slices] = plans;
     let (uniform, lispsm, slices) = (uniform?, lispsm?, slices?);
     let target = FrameTarget::new(set.gpu, set.camera.image())?;
-    let [mut a, mut b, mut c] = [set.renderer()?, set.renderer()?, set.renderer()?];
+    let pcf = Filter::pcf(3)?;
+    let [mut a, mut b, mut c] = [set.renderer(pcf)?, set.renderer(pcf)?, set.renderer(pcf)?];
     let times = race(&mut [
         &mut || set.frame(&mut a, &uniform, &target),
         &mut || set.frame(&mut b, &lispsm, &target),
@@ -133,8 +136,9 @@ fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
 /// The depth pass against one without any library, and against nothing to do.
 fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     let plan = set.plan(Warp::Lispsm, 1, 2048)?;
-    let mut moved = set.renderer()?;
-    let mut still = set.renderer()?;
+    let pcf = Filter::pcf(3)?;
+    let mut moved = set.renderer(pcf)?;
+    let mut still = set.renderer(pcf)?;
     let mut bare = BareDepth::new(set.gpu, set.scene, &plan);
     let start = Instant::now();
     still.draw_maps(&plan, Casters::Still, None)?;
@@ -166,6 +170,42 @@ fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     Ok([times[0] / times[1], times[2] / first])
 }
 
+/// Convolution shadow maps against bilinear comparisons, in the configuration of Annen et al. 2007, Table 1: a map of 1024², a picture of 1024×768.
+fn filters(gpu: &Gpu, scene: &Scene) -> Result<(), Failure> {
+    let set = Set::new(gpu, scene, [1024, 768])?;
+    let plan = set.plan_sized(Warp::Uniform, 1, Size::Exact([1024; 2]))?;
+    let target = FrameTarget::new(gpu, set.camera.image())?;
+    let csm = |order, blur, half| -> Result<Filter, Failure> {
+        let statistic = Statistic::Csm(Csm::new(order, 0.0, false, true)?);
+        Ok(Filter::Prefiltered(Prefilter { statistic, blur, half }))
+    };
+    let pixel = Blur::Width(Width::Pixels(1.0));
+    let contenders = [
+        ("pcf2", Filter::pcf(2)?),
+        ("csm4", csm(4, Blur::Texels(1), false)?),
+        ("csm8", csm(8, Blur::Texels(1), false)?),
+        ("csm16", csm(16, Blur::Texels(1), false)?),
+        ("csm4(blur=7)", csm(4, Blur::Texels(7), false)?),
+        ("csm4(blur=3,half)", csm(4, Blur::Texels(3), true)?),
+        ("csm4(blur=1px)", csm(4, pixel, false)?),
+    ];
+    let mut renderers = Vec::new();
+    for (_, filter) in contenders {
+        renderers.push(set.renderer(filter)?);
+    }
+    let mut jobs: Vec<_> = renderers.iter_mut().map(|r| || set.frame(r, &plan, &target)).collect();
+    let mut jobs: Vec<&mut dyn FnMut() -> Result<(), Failure>> =
+        jobs.iter_mut().map(|job| job as _).collect();
+    let times = race(&mut jobs)?;
+    let triangles: usize =
+        scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len()).sum();
+    println!("{}, {triangles} triangles, 1024² texels, 1024×768:", scene.name);
+    for ((name, _), time) in contenders.iter().zip(&times) {
+        println!("  {name}: {time:.1} ms, {:.3} of pcf2", time / times[0]);
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Failure> {
     // `cargo test --benches` runs this too, and only wants to know that it can.
     if !std::env::args().any(|a| a == "--bench") {
@@ -192,10 +232,14 @@ fn main() -> Result<(), Failure> {
             Err(e) => println!("left out: {e}"),
         }
     }
+    filters(&gpu, &umbrage_scene::builtin("grove", Some(30))?)?;
+    if let Some(forest) = scenes.iter().find(|s| s.name.starts_with("forest")) {
+        filters(&gpu, forest)?;
+    }
     let mut sums = [0.0; 4];
     for scene in &scenes {
         println!("{}", scene.name);
-        let set = Set::new(&gpu, scene)?;
+        let set = Set::new(&gpu, scene, [960, 540])?;
         let ratios = [techniques(&set)?, depth_pass(&set)?].concat();
         sums.iter_mut().zip(ratios).for_each(|(sum, ratio)| *sum += f64::ln(ratio));
     }

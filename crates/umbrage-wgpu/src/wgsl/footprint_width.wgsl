@@ -6,16 +6,9 @@ fn shadow_spread(rest: f32) -> vec2f {
         return vec2f(1.0, 0.0);
     }
     let n = clamp(ceil(1.5 * sqrt(rest)), 2.0, {MAX_SAMPLES});
-    // Few places, cut off at the ends, do not have the variance of what they stand for.
-    var sum = 0.0;
-    var square = 0.0;
-    for (var i = 0.5; i < n; i += 1.0) {
-        let at = i / n * 4.0 - 2.0;
-        let weight = exp(-0.5 * at * at);
-        sum += weight;
-        square += weight * at * at;
-    }
-    return vec2f(n, sqrt(rest * sum / square) * 4.0 / n);
+    // Places that are cut off at two deviations have less variance than what they stand for; two have the same.
+    let kept = select({KEPT_VARIANCE}, 1.0, n == 2.0);
+    return vec2f(n, sqrt(rest / kept) * 4.0 / n);
 }
 
 fn shadow_footprint(receiver: ShadowReceiver) -> ShadowFootprint {

@@ -3,10 +3,8 @@
 struct ShadowPrefilterMap {
     beam_scale: vec4f,
     slab: vec4f,
-    // Where the map begins in the texture, and what may be read: the map with its gutter.
+    // Where the map begins in the texture.
     origin: vec2f,
-    low: vec2i,
-    high: vec2i,
     // First layer of the numbers.
     first_layer: u32,
 }
@@ -66,9 +64,6 @@ fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
 }
 //ELSE
 fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {
-    let low = shadow_prefilter_map.low;
-    let high = shadow_prefilter_map.high;
-    let direction = vec2i({DIRECTION});
     var sum = {WEIGHT_0} * textureLoad(shadow_prefilter_source, at, layer, 0);
 {TAPS}
     return sum;
