@@ -5,11 +5,13 @@ mod aliasing;
 mod chart;
 mod contour;
 mod convolution;
+mod filtered;
 mod lispsm;
 mod measured;
 mod misprints;
 mod ours;
 mod planned;
+mod rendered;
 mod warping;
 
 use crate::args;
@@ -171,6 +173,8 @@ const FIGURES: &[(&str, Make)] = &[
     ("theory-fig3", aliasing::theory_fig3),
     ("csm-fig3", convolution::fig3),
     ("csm-fig6", convolution::fig6),
+    ("csm-fig7", filtered::fig7),
+    ("csm-fig8", filtered::fig8),
     ("ours-theta", ours::theta),
     ("ours-critical", ours::critical),
     ("ours-gain", ours::gain),

@@ -2,6 +2,7 @@
 
 mod airfield;
 pub mod closed_form;
+mod contacts;
 mod fence;
 mod grove;
 mod lantern;
@@ -79,6 +80,14 @@ const BUILTINS: &[BuiltinInfo] = &[
         default_size: 2,
         max_size: 200,
         build: lantern::lantern,
+    },
+    BuiltinInfo {
+        name: "contacts",
+        about: "Two squares and a slanted board that touches the ground: how near an occluder may be",
+        size_means: "quads along each edge",
+        default_size: 1,
+        max_size: 1000,
+        build: contacts::contacts,
     },
     BuiltinInfo {
         name: "pole",

@@ -1,0 +1,98 @@
+//! Pictures of shadows that were really rendered, side by side.
+
+use crate::pixels::{self, Rows, Shadowed};
+use crate::spec::Technique;
+use anyhow::{Context, Result};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use std::fmt::Write;
+use umbrage::{Bounds, Camera, Light, LookAt};
+use umbrage_measure::{Image, Rgb, png};
+use umbrage_scene::Scene;
+use umbrage_trace::{Reference, Tracer, View};
+
+/// Width and height of a picture, pixels.
+const TILE: [u32; 2] = [270, 180];
+const GAP: u32 = 8;
+const LABEL: u32 = 22;
+
+/// A built-in scene with a view into it.
+pub(super) struct Shot<'a> {
+    tracer: &'a Tracer<'a>,
+    bounds: Bounds<'a>,
+    camera: Camera,
+    light: Light,
+}
+
+impl<'a> Shot<'a> {
+    /// `look` changes the scene's own view.
+    pub(super) fn new(
+        scene: &Scene,
+        tracer: &'a Tracer<'a>,
+        light: Light,
+        look: impl FnOnce(&mut LookAt),
+    ) -> Result<Self> {
+        let v = scene.default_view();
+        let mut view = LookAt {
+            eye: v.eye,
+            target: v.target,
+            up: v.up,
+            fov_y_rad: v.fov_y_rad,
+            near: v.near,
+            far: v.far,
+            image: TILE,
+        };
+        look(&mut view);
+        let camera = Camera::look_at(view)?;
+        Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })
+    }
+
+    /// What a technique, as on the command line, makes of it.
+    pub(super) fn picture(&self, technique: &str) -> Result<Image<Rgb>> {
+        let technique: Technique = technique.parse()?;
+        let (plan, _) = pixels::plan(&technique, &self.camera, &self.light, &self.bounds)?;
+        let reference = Reference::render(self.tracer, &plan, technique.filter, &|_| {})?;
+        // Pixels at their centres, as renderers shade.
+        let view = View::new(self.tracer, self.camera, self.light, 1)?;
+        let mut picture = Shadowed::default();
+        for rows in view.bands() {
+            picture.push(&Rows::new(&view, rows, &|_| {}).by_reference(&plan, &reference));
+        }
+        Ok(Image::new(TILE, picture.color)?)
+    }
+}
+
+/// Pictures in rows of `columns`, each with what it is written below, as one drawing.
+pub(super) fn sheet(
+    title: &str,
+    columns: usize,
+    pictures: &[(String, Image<Rgb>)],
+) -> Result<String> {
+    let rows = pictures.len().div_ceil(columns) as u32;
+    let [width, height] = [
+        columns as u32 * (TILE[0] + GAP) + GAP,
+        super::chart::TITLE_HEIGHT + rows * (TILE[1] + LABEL + GAP),
+    ];
+    let mut svg = format!(
+        "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" \
+         font-size=\"14\" text-anchor=\"middle\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n<text x=\"{}\" y=\"22\" \
+         font-size=\"16\">{title}</text>\n",
+        width / 2
+    );
+    for (i, (label, picture)) in pictures.iter().enumerate() {
+        let x = GAP + (i % columns) as u32 * (TILE[0] + GAP);
+        let y = super::chart::TITLE_HEIGHT + (i / columns) as u32 * (TILE[1] + LABEL + GAP);
+        let data = BASE64_STANDARD.encode(png(picture)?);
+        writeln!(
+            svg,
+            "<image x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" href=\"data:image/png;base64,{data}\"/>\n<text x=\"{}\" y=\"{}\">{label}</text>",
+            TILE[0],
+            TILE[1],
+            x + TILE[0] / 2,
+            y + TILE[1] + 16
+        )
+        .context("text")?;
+    }
+    svg += "</svg>\n";
+    Ok(svg)
+}
