@@ -232,6 +232,7 @@ impl Compared {
                 // One unknown figure, to be told from zero.
                 casters_culled: Some(0.1 * (i % 5) as f64),
                 flicker: None,
+                noise: None,
                 storage_factor: [Some(865_159.0), Some(865.2), None, Some(31.8), Some(6.0)][i % 5],
                 ms: Times {
                     plan: Some(0.004 + i as f64 / 1000.0),

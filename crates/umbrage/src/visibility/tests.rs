@@ -150,3 +150,56 @@ fn texel_coordinates_follow_the_rows() {
         assert!((texel - DVec2::new(3.0, 20.0 * row)).length() < 1e-9, "{texel}");
     }
 }
+
+/// Convolution maps of a slanted occluder, looked up in their smaller copies, along and across a footprint, let through what comparisons of all texels do, each with
+/// the weight that it has in the footprint, but for the terms that are left out.
+#[test]
+fn smaller_copies_of_a_slanted_plane_are_comparisons_over_the_same_footprint() {
+    use statistic::{Csm, MAX_CHANNELS, Statistic};
+    let map = map([512, 512], Rows::Even);
+    let slope = 0.008;
+    let depth =
+        |i: i32, _: i32| (0.5 + slope * (f64::from(i) + 0.5 - 256.0)).clamp(0.0, 1.0) as f32;
+    for (order, deviation_texels, shear, allowed) in
+        [(16, 6.0, 0.0, 0.04), (16, 14.0, 0.8, 0.015), (8, 20.0, 0.5, 0.02), (4, 30.0, 0.0, 0.015)]
+    {
+        let statistic = Statistic::Csm(Csm::new(order, 0.0, false, false).unwrap());
+        let blur = Blur::Width(Width::Metres(1.0));
+        let prefilter = Prefilter { statistic, blur, half: false };
+        let filter = Filter::Prefiltered(prefilter);
+        // Longer along t, and sheared.
+        let side = deviation_texels / Prefilter::DEVIATION;
+        let texel_metric = [1.0, 6.0, shear].map(|m| m * side * side);
+        let (mut worst, mut least, mut most) = (0.0f32, 1.0f32, 0.0f32);
+        for step in -20..=20 {
+            let beyond = f64::from(step) * 0.1 * slope * deviation_texels;
+            let receiver = Receiver { texel_metric, ..flat(0.5003, 0.4998, 0.5 + beyond) };
+            let footprint = prefilter.footprint(&receiver);
+            assert!(footprint.level > 1 && footprint.samples[0] > footprint.samples[1]);
+            let is_lit = |i, j| f64::from(u8::from(f64::from(depth(i, j)) >= receiver.depth));
+            // Bilinearly between boxes of texels.
+            let sample = |texel: DVec2, level: u32| {
+                let size = 1 << level;
+                let corner = texel / f64::from(size) - 0.5;
+                let (first, fraction) = (corner.floor(), corner - corner.floor());
+                let lit = |x: i32, y: i32| {
+                    let [i, j] = [first.x as i32 + x, first.y as i32 + y].map(|k| k * size);
+                    let all = (0..size * size).map(|k| is_lit(i + k % size, j + k / size));
+                    all.sum::<f64>() / f64::from(size * size)
+                };
+                let row = |y| lit(0, y) * (1.0 - fraction.x) + lit(1, y) * fraction.x;
+                let mut share = [0.0; MAX_CHANNELS];
+                share[0] = (row(0) * (1.0 - fraction.y) + row(1) * fraction.y) as f32;
+                share
+            };
+            let at = texel_coordinates(&map, receiver.st);
+            let [expected, ..] = footprint.gather(at, drawn(&map, filter), sample);
+            let found = visibility(&map, filter, &receiver, depth);
+            worst = worst.max((found - expected).abs());
+            (least, most) = (least.min(found), most.max(found));
+        }
+        // The less of the step the terms left out hold, the wider the footprint is in depth.
+        assert!(worst < allowed, "M = {order}, {deviation_texels} texels: {worst}");
+        assert!(least < 0.1 && most > 0.9, "nothing passes from light to dark");
+    }
+}
