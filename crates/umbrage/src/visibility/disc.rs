@@ -3,8 +3,8 @@
 /// The most places that there are.
 pub(super) const MAX_PLACES: usize = 64;
 
-/// Poisson-disc places in the disc of diameter 1 around 0: each is, of a number of random candidates, the one farthest from all before it (Mitchell 1991), so
-/// that the first n of them are spread evenly for every n.
+/// Poisson-disc places in the disc of diameter 1 around 0: each is, of a number of random candidates, the one farthest from all before it (Mitchell 1991) and
+/// a third as much, from its own mirror image beyond the rim, or the rim would draw too many; so the first n of them are spread evenly for every n.
 pub(super) const PLACES: [[f32; 2]; MAX_PLACES] = places();
 
 /// Candidates for each place.
@@ -25,11 +25,13 @@ const fn places() -> [[f32; 2]; MAX_PLACES] {
                 at[axis] = (seed >> 8) as f32 / (1 << 24) as f32 - 0.5;
                 axis += 1;
             }
-            if at[0] * at[0] + at[1] * at[1] > 0.25 {
+            let square = at[0] * at[0] + at[1] * at[1];
+            if square > 0.25 {
                 continue;
             }
             candidate += 1;
-            let mut nearest = 1.0;
+            let to_image = 3.0 * (1.0 - 2.0 * root(square));
+            let mut nearest = to_image * to_image;
             let mut i = 0;
             while i < n {
                 let [x, y] = [at[0] - places[i][0], at[1] - places[i][1]];
@@ -47,6 +49,17 @@ const fn places() -> [[f32; 2]; MAX_PLACES] {
         n += 1;
     }
     places
+}
+
+/// The square root of what is at most 1/4 (`f32::sqrt` is not const).
+const fn root(square: f32) -> f32 {
+    let mut root = 0.5;
+    let mut step = 0;
+    while step < 12 {
+        root = 0.5 * (root + square / root);
+        step += 1;
+    }
+    root
 }
 
 #[cfg(test)]
@@ -70,9 +83,9 @@ mod tests {
                 mean[1] += y / n as f32;
                 square += (x * x + y * y) / n as f32;
             }
-            assert!(mean[0].hypot(mean[1]) < 0.2 / (n as f32).sqrt(), "{n}: {mean:?}");
+            assert!(mean[0].hypot(mean[1]) < 0.3 / (n as f32).sqrt(), "{n}: {mean:?}");
             // 1/8 in the mean over the disc.
-            assert!((square - 0.125).abs() < 0.25 / n as f32 + 0.02, "{n}: {square}");
+            assert!((square - 0.125).abs() < 0.25 / n as f32 + 0.01, "{n}: {square}");
         }
     }
 }
