@@ -135,7 +135,7 @@ pub(crate) struct Compare {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
-    /// Measure flicker too: how often shadows change in a motion where the truth does not.
+    /// Measure flicker too: how often shadows change in a motion where the truth does not; and with `away` noise: how much pixels sparkle.
     #[arg(long, value_enum)]
     pub(crate) motion: Option<Motion>,
     /// Frames of the motion.
@@ -278,9 +278,9 @@ pub(crate) struct SceneArgs {
     pub(crate) opaque: bool,
 }
 
-/// What to compare with the truth, and how finely.
+/// Techniques that compete.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct ComparisonArgs {
+pub(crate) struct TechniqueArgs {
     /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
     #[arg(long_help = SHADOWS_HELP,
         long, value_name = "SPEC",
@@ -289,15 +289,29 @@ pub(crate) struct ComparisonArgs {
     pub(crate) shadows: Vec<Technique>,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
-    /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
-    /// comparisons use 1.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
-    pub(crate) samples: u32,
     /// What the maps are fitted to.
     #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
     pub(crate) fit: Fit,
     #[command(flatten)]
     pub(crate) execution: ExecutionArgs,
+}
+
+impl TechniqueArgs {
+    fn check(&mut self) -> Result<()> {
+        self.texels.apply(&mut self.shadows)?;
+        check_distinct(&self.shadows)
+    }
+}
+
+/// What to compare with the truth, and how finely.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ComparisonArgs {
+    #[command(flatten)]
+    pub(crate) techniques: TechniqueArgs,
+    /// Rays along each side of a pixel: K×K samples. Renderers shade at pixel centres only, so
+    /// comparisons use 1.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) samples: u32,
 }
 
 /// What shadow maps are fitted to.
@@ -423,9 +437,11 @@ WARP:   unfocused, uniform, uniform(stable), psm, lispsm, tsm,
 +face:  maps for the four sides of the view and its near face;
         +face(sides) without the near face.
 FILTER: hard (default); pcfN for the mean over N×N texels; vsm, esm, evsm,
-        evsm2, msm, csmM (M = 1 to 16) with (blur=7) texels.
-        (blur=2px) and (blur=0.3m) are as wide near as far, for pcfN too.
-        csmM also takes attenuation=A, offset, scale and bits=16.
+        evsm2, msm, csmM (M = 1 to 16) with (blur=7) texels, (half) as
+        many of them each way. (blur=2px) and (blur=0.3m) are as wide near
+        as far, for pcfN too, which with them takes poisson.
+        csmM also takes attenuation=A, offset, scale, leak=L and bits=16.
+        pcss for soft shadows: (light=0.53deg) or (light=0.2m), (samples=6).
 TEXELS: a budget of TEXELS² texels for all maps, shared among them and
         between s and t as the view needs it (default 1024), or WxH for
         exactly these in every map.";
@@ -448,7 +464,7 @@ pub(crate) fn parse(
     let checked = match &mut command {
         Command::Render(render) => render.check(),
         Command::Compare(compare) => compare.check(),
-        Command::Sweep(sweep) => sweep.comparison.check(),
+        Command::Sweep(sweep) => sweep.comparison.techniques.check(),
         Command::Plan(plan) => plan.check(),
         Command::Scenes(_) | Command::Figures(_) | Command::Devices(_) => Ok(()),
         Command::Bench(bench) => bench.check(),
@@ -500,14 +516,7 @@ impl Compare {
     fn check(&mut self) -> Result<()> {
         self.view.check()?;
         self.light.check()?;
-        self.comparison.check()
-    }
-}
-
-impl ComparisonArgs {
-    fn check(&mut self) -> Result<()> {
-        self.texels.apply(&mut self.shadows)?;
-        check_distinct(&self.shadows)
+        self.comparison.techniques.check()
     }
 }
 

@@ -114,17 +114,17 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let onlooker = onlooker(&args.view, Some(&scene))?;
     let camera = onlooker.camera;
     let lamp = lamp(&args.light, Some(&scene))?;
-    let execution = Execution::open(&args.execution, &args.shadows)?;
+    let execution = Execution::open(&args.techniques.execution, &args.techniques.shadows)?;
     let sets = Sets::new(&scene, &execution, args.scene.opaque)?;
     let view = umbrage_trace::View::new(&sets.tracer, camera, lamp.light, 1)?;
-    let receivers = Receivers::new(&scene, &sets.tracer, args.fit);
+    let receivers = Receivers::new(&scene, &sets.tracer, args.techniques.fit);
     let bounds = receivers.bounds();
     tell_notices(&scene);
     execution.announce();
     let frames = WARM_UP + args.frames;
-    let progress = Progress::new(u64::from(frames) * args.shadows.len() as u64, quiet);
+    let progress = Progress::new(u64::from(frames) * args.techniques.shadows.len() as u64, quiet);
     let mut contenders = Vec::new();
-    for technique in &args.shadows {
+    for technique in &args.techniques.shadows {
         let bencher = sets.bencher(technique, camera.image())?;
         contenders.push(Contender {
             technique,

@@ -15,8 +15,11 @@ use umbrage_measure::{Measured, Report};
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output, Contents::Comparison)?;
     let scene = open_scene(&args.scene.name)?;
-    let execution = Execution::open(&args.comparison.execution, &args.comparison.shadows)?;
-    let stage = Stage::new(&scene, &execution, args.scene.opaque, args.comparison.fit)?;
+    let execution = Execution::open(
+        &args.comparison.techniques.execution,
+        &args.comparison.techniques.shadows,
+    )?;
+    let stage = Stage::new(&scene, &execution, args.scene.opaque, args.comparison.techniques.fit)?;
     let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;
     if let Some(motion) = args.motion {
         comparison.check_motion(motion, args.frames)?;

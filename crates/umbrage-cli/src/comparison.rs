@@ -112,7 +112,7 @@ impl<'a> Comparison<'a> {
             .context("--samples")?;
         let bounds = stage.receivers.bounds();
         let plan = |t| pixels::plan(t, &onlooker.camera, &lamp.light, &bounds);
-        let plans = options.shadows.iter().map(plan).collect::<Result<Vec<_>>>()?;
+        let plans = options.techniques.shadows.iter().map(plan).collect::<Result<Vec<_>>>()?;
         Ok(Self { stage, options, onlooker, lamp, view, plans })
     }
 
@@ -127,7 +127,7 @@ impl<'a> Comparison<'a> {
 
     /// Rows of rays and of measuring that there are to do.
     pub(crate) fn rows(&self) -> u64 {
-        let plans = self.plans.iter().zip(&self.options.shadows);
+        let plans = self.plans.iter().zip(&self.options.techniques.shadows);
         let rows_of_maps: u64 = plans.map(|((plan, _), t)| self.stage.sets.rows(plan, t)).sum();
         // Of the picture: what is seen, the truth; each technique's lookups and measuring.
         rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
@@ -136,18 +136,19 @@ impl<'a> Comparison<'a> {
     /// Renders the maps, and traces the truth and every technique's picture.
     pub(crate) fn trace(&self, progress: &Progress) -> Result<Compared<'_>> {
         let mut contenders = Vec::new();
-        for (technique, (plan, ms)) in self.options.shadows.iter().zip(&self.plans) {
+        for (technique, (plan, ms)) in self.options.techniques.shadows.iter().zip(&self.plans) {
             progress.stage(format!("{}: shadow map", technique.spec));
             let mut executor = self.stage.sets.executor(technique)?;
             let start = Instant::now();
-            executor.render(plan, &|rows| progress.advance(rows))?;
+            let filter = executor.render(plan, &|rows| progress.advance(rows))?;
+            let depth = milliseconds(start) - filter.unwrap_or(0.0);
             contenders.push(Contender {
                 technique,
                 plan,
                 executor,
                 flicker: None,
                 noise: None,
-                ms: Times { plan: Some(*ms), depth: Some(milliseconds(start)), ..Times::default() },
+                ms: Times { plan: Some(*ms), depth: Some(depth), filter, shade: None },
                 shadowed: Shadowed::default(),
                 texels: Texels::default(),
             });
@@ -178,12 +179,12 @@ impl Compared<'_> {
             light: lamp.light,
             samples: options.samples,
         };
-        let flicker = flicker(motion, frames, &scenery, &options.shadows, progress)?;
+        let flicker = flicker(motion, frames, &scenery, &options.techniques.shadows, progress)?;
         for (contender, flicker) in self.contenders.iter_mut().zip(flicker) {
             contender.flicker = flicker;
         }
         if motion == Motion::Away {
-            let noise = noise(motion, frames, &scenery, &options.shadows, progress)?;
+            let noise = noise(motion, frames, &scenery, &options.techniques.shadows, progress)?;
             for (contender, noise) in self.contenders.iter_mut().zip(noise) {
                 contender.noise = noise.mean;
             }

@@ -117,7 +117,9 @@ impl<'a> Sets<'a> {
             Some((gpu, buffers)) => {
                 let options = ShadowOptions { filter, ..ShadowOptions::default() };
                 let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
-                Ok(Executor::Gpu(Box::new(OnGpu { renderer, gpu, plan: None })))
+                let is_prefiltered = matches!(filter, Filter::Prefiltered(_));
+                let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
+                Ok(Executor::Gpu(Box::new(OnGpu { renderer, gpu, timer, plan: None })))
             }
             None => Ok(Executor::Reference { tracer: &self.tracer, filter, maps: None }),
         }
@@ -134,6 +136,8 @@ pub(crate) enum Executor<'a> {
 pub(crate) struct OnGpu<'a> {
     renderer: Renderer<'a, 'a>,
     gpu: &'a Gpu,
+    /// Tells how long filtering takes, where there is anything to tell.
+    timer: Option<Timer>,
     /// Whose maps are drawn.
     plan: Option<&'a Plan>,
 }
@@ -159,19 +163,21 @@ impl<'a> Executor<'a> {
         matches!(self, Self::Gpu(_))
     }
 
-    /// Renders the maps of a plan, in place of those of the one before.
-    pub(crate) fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<()> {
+    /// Renders the maps of a plan, in place of those of the one before. Gives the milliseconds that filtering took of that, where they are told apart.
+    pub(crate) fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<Option<f64>> {
         match self {
             Self::Gpu(on) => {
-                on.renderer.draw_maps(new, Casters::Still, None).context("--backend gpu")?;
-                on.gpu.wait()?;
-                on.plan = Some(new);
+                let OnGpu { renderer, gpu, timer, plan } = &mut **on;
+                renderer.draw_maps(new, Casters::Still, timer.as_ref()).context("--backend gpu")?;
+                gpu.wait()?;
+                *plan = Some(new);
+                Ok(timer.as_ref().map(|t| t.read(gpu)).transpose()?.map(|[_, filter, _]| filter))
             }
             Self::Reference { tracer, filter, maps } => {
                 *maps = Some((new, Reference::render(tracer, new, *filter, progress)?));
+                Ok(None)
             }
         }
-        Ok(())
     }
 
     /// Memory of what lookup reads of the maps that are rendered.

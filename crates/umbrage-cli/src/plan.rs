@@ -9,7 +9,8 @@ use anyhow::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
 use umbrage::{
-    Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size, Warp,
+    Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size, Slab,
+    Warp,
 };
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -39,6 +40,21 @@ struct LightJson {
     maps: [usize; 2],
 }
 
+/// As [`Slab`] has it.
+#[derive(Serialize)]
+struct SlabJson {
+    slope: [f64; 2],
+    begin: f64,
+    thickness: f64,
+}
+
+impl From<Slab> for SlabJson {
+    fn from(slab: Slab) -> Self {
+        let Slab { slope, begin, thickness } = slab;
+        Self { slope: slope.to_array(), begin, thickness }
+    }
+}
+
 #[derive(Serialize)]
 struct MapJson {
     /// Four columns.
@@ -51,6 +67,8 @@ struct MapJson {
     /// `null`: no warp.
     lambda: Option<f64>,
     error: ErrorJson,
+    /// Where receivers lie in linear depth, for filters that store functions of it.
+    slab: SlabJson,
     /// Index along the view, from the viewer.
     slice: usize,
     /// Index of the light.
@@ -166,6 +184,7 @@ impl<'a> Planned<'a> {
             face: m.part.face.map(face_name),
             lambda: m.lambda,
             error: m.error.into(),
+            slab: m.slab.into(),
             slice: m.part.slice,
             light: m.part.light,
             side: m.part.side.map(side_name),

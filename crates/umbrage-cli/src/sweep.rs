@@ -34,14 +34,17 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
     if let Some(scenes) = &args.scenes {
         ensure!(scenes.is_dir(), "--scenes: {} is not a folder", scenes.display());
     }
-    let execution = Execution::open(&args.comparison.execution, &args.comparison.shadows)?;
+    let execution = Execution::open(
+        &args.comparison.techniques.execution,
+        &args.comparison.techniques.shadows,
+    )?;
     let settings = SweepSettings {
-        shadows: args.comparison.shadows.iter().map(|t| t.spec.to_string()).collect(),
-        max_error: args.comparison.texels.max_error,
+        shadows: args.comparison.techniques.shadows.iter().map(|t| t.spec.to_string()).collect(),
+        max_error: args.comparison.techniques.texels.max_error,
         size: args.size,
         samples: args.comparison.samples,
         opaque: args.opaque,
-        fit: args.comparison.fit.name().into(),
+        fit: args.comparison.techniques.fit.name().into(),
         backend: execution.name().into(),
     };
     let folder = if args.merge.is_empty() {
@@ -154,7 +157,7 @@ fn compare_missing(
         let stage = scene
             .as_ref()
             .map_err(again)
-            .and_then(|s| Stage::new(s, execution, args.opaque, args.comparison.fit));
+            .and_then(|s| Stage::new(s, execution, args.opaque, args.comparison.techniques.fit));
         for view in pending {
             number += 1;
             progress.name(format!("{number}/{} {}", views.len(), view.inputs.view.name));

@@ -333,6 +333,9 @@ impl<'g, 's> Renderer<'g, 's> {
             }
             drawn.push((map.index, into_map));
         });
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
         Ok(drawn)

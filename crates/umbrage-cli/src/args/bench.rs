@@ -1,10 +1,6 @@
 //! `umbrage bench` and `umbrage devices`: what may be asked for.
 
-use super::{
-    DEFAULT_TECHNIQUES, ExecutionArgs, Fit, LightArgs, SHADOWS_HELP, SceneArgs, TexelArgs,
-    ViewArgs, check_distinct,
-};
-use crate::spec::Technique;
+use super::{LightArgs, SceneArgs, TechniqueArgs, ViewArgs};
 use anyhow::Result;
 use clap::Args;
 
@@ -21,25 +17,14 @@ Examples:
 pub(crate) struct Bench {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
-    #[arg(long_help = SHADOWS_HELP,
-        long, value_name = "SPEC",
-        default_values = DEFAULT_TECHNIQUES
-    )]
-    pub(crate) shadows: Vec<Technique>,
     #[command(flatten)]
-    pub(crate) texels: TexelArgs,
+    pub(crate) techniques: TechniqueArgs,
     /// Frames that count, after two that do not.
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(20..=10000))]
     pub(crate) frames: u32,
     /// Nothing moves: maps that are as they were are not drawn again.
     #[arg(long)]
     pub(crate) still: bool,
-    /// What the maps are fitted to.
-    #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
-    pub(crate) fit: Fit,
-    #[command(flatten)]
-    pub(crate) execution: ExecutionArgs,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -51,10 +36,9 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(super) fn check(&mut self) -> Result<()> {
-        self.texels.apply(&mut self.shadows)?;
         self.view.check()?;
         self.light.check()?;
-        check_distinct(&self.shadows)
+        self.techniques.check()
     }
 }
 

@@ -1,4 +1,4 @@
-use super::filter::{BlurWidth, BlurredKind, FilterOption};
+use super::filter::{BlurWidth, BlurredKind, FilterOption, LightSize};
 use super::partition::SliceOption;
 use super::*;
 use proptest::prelude::*;
@@ -199,19 +199,17 @@ fn bad_specifications_say_what_would_be_right() {
 }
 
 #[test]
-fn what_is_not_built_yet_says_so() {
-    let error = "uniform:pcss".parse::<Technique>().unwrap_err().to_string();
-    assert!(error.contains("not available in this version"), "{error}");
-}
-
-#[test]
 fn every_filter_that_is_built_can_be_executed() {
     for (text, expected) in [
         ("uniform:vsm", "vsm"),
         ("uniform:esm(blur=5,exponent=40)", "esm"),
         ("uniform:evsm(blur=1.5px)", "evsm"),
         ("uniform:evsm2(blur=0.2m,leak=0.1)", "evsm2"),
-        ("uniform:msm(leak=0.2)", "msm"),
+        ("uniform:msm(leak=0.2,half)", "msm"),
+        ("uniform:pcss", "pcss"),
+        ("uniform:pcss(light=2deg,samples=8)", "pcss"),
+        ("uniform:pcss(light=0.2m)", "pcss"),
+        ("uniform:pcf5(blur=2px,poisson)", "pcf5(blur=2px,poisson)"),
         ("uniform:csm8(blur=7,attenuation=1,offset,bits=16)", "csm8"),
         ("uniform:pcf5(blur=2px)", "pcf5(blur=2px)"),
     ] {
@@ -277,20 +275,39 @@ fn filter() -> impl Strategy<Value = Filter> {
         proptest::option::of(Just(FilterOption::Offset)),
         proptest::option::of(Just(FilterOption::Scale)),
         proptest::option::of(Just(FilterOption::Bits(16))),
+        proptest::option::of(Just(FilterOption::Half)),
     );
     prop_oneof![
         Just(Filter::Hard),
-        (1u32..=15, proptest::option::of(width()))
-            .prop_map(|(n, width)| Filter::Pcf(n, width.into_iter().collect())),
-        Just(Filter::Pcss(vec![])),
+        (1u32..=15, proptest::option::of(width()), any::<bool>()).prop_map(
+            |(n, width, poisson)| {
+                let poisson = poisson.then_some(FilterOption::Poisson);
+                Filter::Pcf(n, poisson.into_iter().chain(width).collect())
+            }
+        ),
+        (proptest::option::of(light_size()), proptest::option::of(1u32..=8)).prop_map(
+            |(light, samples)| {
+                let light = light.map(FilterOption::Light);
+                let samples = samples.map(FilterOption::Samples);
+                Filter::Pcss([samples, light].into_iter().flatten().collect())
+            }
+        ),
         blurred(BlurredKind::Vsm),
         blurred(BlurredKind::Esm),
         blurred(BlurredKind::Evsm),
         blurred(BlurredKind::Evsm2),
         blurred(BlurredKind::Msm),
-        (1u32..=16, csm_options).prop_map(|(m, (blur, attenuation, offset, scale, bits))| {
-            Filter::Csm(m, [scale, blur, attenuation, bits, offset].into_iter().flatten().collect())
+        (1u32..=16, csm_options).prop_map(|(m, (blur, attenuation, offset, scale, bits, half))| {
+            let options = [scale, blur, half, attenuation, bits, offset];
+            Filter::Csm(m, options.into_iter().flatten().collect())
         }),
+    ]
+}
+
+fn light_size() -> impl Strategy<Value = LightSize> {
+    prop_oneof![
+        (0.001f32..90.0).prop_map(LightSize::Degrees),
+        (0.001f32..1e6).prop_map(LightSize::Metres)
     ]
 }
 

@@ -58,6 +58,7 @@ fn json_has_the_documented_shape() {
             "rect",
             "resolution",
             "side",
+            "slab",
             "slice",
             "split",
             "world_to_shadow"

@@ -4,7 +4,7 @@ use crate::types::Scene;
 use glam::{DVec3, Vec3};
 
 /// Half the ground's width, metres.
-const HALF: f32 = 4.0;
+const HALF: f32 = 6.0;
 /// Heights of the squares and of the slanted board's far end, metres.
 const LOW: f32 = 0.45;
 const HIGH: f32 = 1.35;
