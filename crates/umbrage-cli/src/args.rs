@@ -49,7 +49,7 @@ pub(crate) enum Command {
     Plan(Plan),
     /// List the built-in scenes.
     Scenes(Scenes),
-    /// Compute the papers' figures again, from closed forms and from planned maps.
+    /// Compute the papers' figures again, from closed forms, planned maps and renders.
     Figures(Figures),
     /// Compute the papers' closed forms: errors, storage, warps, the Fourier step.
     Theory(theory::Theory),
@@ -440,7 +440,8 @@ FILTER: hard (default); pcfN for the mean over N×N texels; vsm, esm, evsm,
         evsm2, msm, csmM (M = 1 to 16) with (blur=7) texels, (half) as
         many of them each way. (blur=2px) and (blur=0.3m) are as wide near
         as far, for pcfN too, which with them takes poisson.
-        csmM also takes attenuation=A, offset, scale, leak=L and bits=16.
+        leak=L (not esm) takes what is darker for shadow; exponent=C is for
+        esm and evsm; csmM takes attenuation=A, offset, scale and bits=16.
         pcss for soft shadows: (light=0.53deg) or (light=0.2m), (samples=6).
 TEXELS: a budget of TEXELS² texels for all maps, shared among them and
         between s and t as the view needs it (default 1024), or WxH for

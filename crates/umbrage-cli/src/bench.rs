@@ -125,6 +125,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let progress = Progress::new(u64::from(frames) * args.techniques.shadows.len() as u64, quiet);
     let mut contenders = Vec::new();
     for technique in &args.techniques.shadows {
+        technique.check_light(&lamp.light)?;
         let bencher = sets.bencher(technique, camera.image())?;
         contenders.push(Contender {
             technique,

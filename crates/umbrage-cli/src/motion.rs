@@ -78,7 +78,7 @@ impl Motion {
                     Light::Directional { direction } => *direction = turn * *direction,
                     Light::Spot(spot) => spot.direction = turn * spot.direction,
                     Light::Point(_) => bail!(
-                        "--motion: a point light has no direction to turn: take dolly or orbit"
+                        "--motion: a point light has no direction to turn: take dolly, orbit or away"
                     ),
                 }
             }
@@ -168,7 +168,7 @@ pub(crate) struct Noise {
     pub(crate) mean: Option<f64>,
 }
 
-/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at its centre being compared with the mean of 16 true ones all
+/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at its centre being compared with the mean of 64 true ones all
 /// over it. What is wrong but steady, as a blur is, does not count. A pixel counts where surfaces that face the light fill it in both frames.
 pub(crate) fn noise(
     motion: Motion,

@@ -236,6 +236,7 @@ pub(crate) fn plan(
     light: &Light,
     bounds: &Bounds<'_>,
 ) -> Result<(Plan, f64)> {
+    technique.check_light(light)?;
     let mut planner = Planner::new();
     let mut plan = || {
         let start = Instant::now();

@@ -159,10 +159,16 @@ impl<'a> Planned<'a> {
         lamps: &'a [Lamp],
         scene: Option<&Scene>,
     ) -> Self {
-        let gutter = technique.filter.reach_texels();
+        let filter = technique.filter;
         let max_side = technique.options.max_side;
-        let [atlas, layers] = [Atlas::packed, Atlas::layered].map(|lay_out| {
-            lay_out(plan, gutter, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
+        let slot = |m: &ShadowMap| match m.resolution {
+            empty if m.is_empty() => empty,
+            full => filter.slot_texels(full),
+        };
+        let slots: Vec<_> = plan.maps.iter().map(slot).collect();
+        let [atlas, layers] = [Atlas::packed_sizes, Atlas::layered_sizes].map(|lay_out| {
+            let atlas = lay_out(&slots, filter.reach_texels(), max_side);
+            atlas.inspect_err(|e| log::info!("no atlas: {e}")).ok()
         });
         let casters = scene.map(|s| casters(plan, s));
         let culled = casters.as_ref().and_then(|c| casters_culled(plan, c));
@@ -172,7 +178,8 @@ impl<'a> Planned<'a> {
     /// x, y, width and height of a map in the atlas, texels.
     fn rect(&self, map: usize) -> Option<[u32; 4]> {
         let place = self.atlas.as_ref()?.places[map]?;
-        Some([place.origin[0], place.origin[1], place.size[0], place.size[1]])
+        let [width, height] = self.plan.maps[map].resolution;
+        Some([place.origin[0], place.origin[1], width, height])
     }
 
     fn json(&self) -> PlanJson {

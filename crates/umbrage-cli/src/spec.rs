@@ -8,7 +8,7 @@ pub(crate) use filter::Filter;
 use partition::{Part, Slices};
 use std::fmt::{self, Display};
 use std::str::FromStr;
-use umbrage::{Faces, Objective, Options, Size, Warp, visibility};
+use umbrage::{Faces, Light, Objective, Options, Size, Warp, visibility};
 
 /// The longest side of a shadow map, texels; what today's GPUs allow.
 pub(crate) const MAX_SIDE: u32 = 16384;
@@ -85,6 +85,7 @@ impl Technique {
             size,
             max_side: MAX_SIDE,
             keeps_casters,
+            reach_texels: filter.reach_texels(),
             ..Options::default()
         };
         Ok(Self { spec, options, filter })
@@ -95,6 +96,22 @@ impl Technique {
     pub(crate) fn limit_error(&mut self, pixels: f64) {
         if self.spec.size.is_none() {
             self.options.size = Size::MaxError(pixels);
+        }
+    }
+
+    /// That the filter's light is of the kind that shines.
+    pub(crate) fn check_light(&self, light: &Light) -> Result<()> {
+        let Some(Filter::Pcss(_)) = &self.spec.filter else { return Ok(()) };
+        let is_sun = matches!(light, Light::Directional { .. });
+        let is_of_sun = self.spec.filter.as_ref().is_some_and(Filter::is_under_sun);
+        match (is_sun, is_of_sun) {
+            (true, false) => {
+                bail!("--shadows {}: a sun's size is an angle, as in light=0.53deg", self.spec)
+            }
+            (false, true) => {
+                bail!("--shadows {}: a lamp's size is a length, as in light=0.2m", self.spec)
+            }
+            _ => Ok(()),
         }
     }
 

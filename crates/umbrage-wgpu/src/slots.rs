@@ -95,7 +95,7 @@ impl Slots {
         let max_side = support.max_side;
         let gutter = filter.reach_texels();
         // What is drawn for a map has sides that are multiples of something, and with them where maps begin.
-        let aligned = |size: [u32; 2]| filter.drawn_texels(size).map(|n| n - 2 * gutter);
+        let aligned = |size: [u32; 2]| filter.slot_texels(size);
         let roomy = |n: u32| {
             let most = max_side.saturating_sub(2 * gutter).max(n);
             (n + n.div_ceil(ROOM)).min(most)

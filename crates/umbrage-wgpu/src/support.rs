@@ -10,7 +10,7 @@ use wgpu::{
 /// | --- | --- |
 /// | [`Features::DEPTH_CLIP_CONTROL`] | casters before a map's depths are clamped in the fragment shader, which writes depth: slower, the same picture |
 /// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold 16 lights, 64 maps and 512 planes |
-/// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` |
+/// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` for `hard` and `pcf`; [`Error::Unsupported`] for all other filters |
 /// | arrays of any number of layers (OpenGL) | a layer more for 1, 6, 12 … |
 /// | interpolated floats, 16-bit or signed 8-bit textures | [`Error::Unsupported`] for the filters that store their numbers so |
 /// | comparison samplers, where depths cannot be fetched | [`Error::Unsupported`] |

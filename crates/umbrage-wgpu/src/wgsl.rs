@@ -350,7 +350,9 @@ mod tests {
         let prefiltered = statistics().into_iter().flat_map(|statistic| {
             let blurs =
                 [Blur::Texels(7), Blur::Width(Width::Metres(0.5)), Blur::Width(Width::Pixels(3.0))];
-            blurs.map(|blur| Filter::Prefiltered(Prefilter { statistic, blur, half: false }))
+            blurs.into_iter().flat_map(move |blur| {
+                [false, true].map(|half| Filter::Prefiltered(Prefilter { statistic, blur, half }))
+            })
         });
         let widths = [Width::Metres(0.5), Width::Pixels(3.0)];
         let spread = [Pattern::Grid, Pattern::Poisson]

@@ -15,8 +15,12 @@ pub struct Options {
     /// Sides of maps are multiples of this, texels, 1 ..= `max_side`.
     pub align: u32,
     /// Whether depths begin where the casters do rather than where the receivers do. Casters nearer the light are flattened otherwise, which shadow tests do not
-    /// mind; but maps then do not tell how far they lie, as soft shadows ask. Without known [casters](crate::Bounds::casters) it changes nothing.
+    /// mind; but maps then do not tell how far they lie, as soft shadows ask. It costs depth some of its digits, so there is an end: 1000 times the receivers' range of
+    /// depth, and a sixteenth of their distance from a lamp. Without known [casters](crate::Bounds::casters) it changes nothing.
     pub keeps_casters: bool,
+    /// How far filters look beyond what a map serves, texels ([`Filter::reach_texels`](crate::visibility::Filter::reach_texels)): what casts there counts as a
+    /// [caster](crate::ShadowMap::may_cast) too.
+    pub reach_texels: u32,
 }
 
 impl Default for Options {
@@ -29,6 +33,7 @@ impl Default for Options {
             max_side: 8192,
             align: 1,
             keeps_casters: false,
+            reach_texels: 0,
         }
     }
 }

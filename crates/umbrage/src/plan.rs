@@ -193,7 +193,7 @@ pub struct ShadowMap {
     pub apex: Option<DVec3>,
     /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
     pub pixel_gradient: DVec3,
-    /// Where the receivers served lie in [linear depth](Self::linear_depth).
+    /// Where the receivers served lie in [linear depth](Self::linear_depth); all of it for lamps, and for maps that stand still or cover all of the scene.
     pub slab: Slab,
 }
 

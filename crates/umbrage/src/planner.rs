@@ -282,6 +282,9 @@ impl Request<'_> {
 /// Casters that lie farther before the receivers than this many of their ranges of depth are flattened in any case: the receivers' own depths need the digits.
 const MOST_CASTER_DEPTHS: f64 = 1000.0;
 
+/// Casters so many times nearer to a lamp than where the receivers' depths begin are flattened in any case: before a lamp there is no end to depth.
+const CLOSEST_TO_LAMP: f64 = 16.0;
+
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 struct Scratch {
@@ -378,17 +381,29 @@ impl Scratch {
     }
 
     /// How far before depth 0 the first of what can cast into a map lies, in depth, ≥ 0.
-    fn nearest_caster(&mut self, map: &ShadowMap, casters: Aabb) -> f64 {
+    fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
         let body = &mut self.casters;
-        body.set_box(body.sides(casters.relative_to(map.origin)));
-        map.caster_planes.iter().for_each(|&p| body.clip(p));
+        body.set_box(draft.body.sides(casters.relative_to(map.origin)));
+        // What a still map holds must not depend on the view.
+        if draft.still.is_none() {
+            map.caster_planes.iter().for_each(|&p| body.clip(p));
+        }
         let depth = |&v: &DVec3| {
             let h = map.shadow_from_local * v.extend(1.0);
-            (h.w > 0.0).then_some(h.z / h.w)
+            if h.w > 0.0 { h.z / h.w } else { f64::NEG_INFINITY }
         };
-        let (nearest, _) = range(body.vertices().iter().filter_map(depth));
-        // Before a lamp itself there is no end to depth.
-        if nearest.is_finite() { (-nearest).clamp(0.0, MOST_CASTER_DEPTHS) } else { 0.0 }
+        let (nearest, _) = range(body.vertices().iter().map(depth));
+        if body.is_empty() {
+            return 0.0;
+        }
+        let [begin, step] = map.beam_scale(DVec2::splat(0.5));
+        // Distances from a lamp go with one over the fourth coordinate.
+        let most = if step == 0.0 {
+            MOST_CASTER_DEPTHS
+        } else {
+            ((CLOSEST_TO_LAMP - 1.0) * begin / -step).clamp(0.0, MOST_CASTER_DEPTHS)
+        };
+        (-nearest).clamp(0.0, most)
     }
 
     /// Gives a map its resolution and all that follows from it.
@@ -424,10 +439,14 @@ impl Scratch {
         if draft.still.is_none() {
             map.begin_earlier(MARGIN_TEXELS * texel_depth(map, &draft.body));
         }
+        if options.reach_texels > 0 {
+            let reach = f64::from(options.reach_texels) * widest_texel(map, &draft.body);
+            map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
+        }
         if let Some(casters) = bounds.casters
             && options.keeps_casters
         {
-            map.begin_earlier(self.nearest_caster(map, casters));
+            map.begin_earlier(self.nearest_caster(map, draft, casters));
         }
         if draft.still.is_none() {
             // A map of the whole scene stays as it is whatever is seen of it.
@@ -477,6 +496,12 @@ impl ShadowMap {
         let origin = camera.eye();
         *self = Self { origin, cell, caster_planes, pixel_gradient, ..Self::default() };
     }
+}
+
+/// The largest width of a texel, metres.
+fn widest_texel(map: &ShadowMap, body: &Body) -> f64 {
+    let at = |&v: &DVec3| Some(Local::at(map, v)?.footprint().longest());
+    body.vertices().iter().filter_map(at).fold(0.0, f64::max)
 }
 
 /// The largest width of a texel, laid along the beam, in depth.

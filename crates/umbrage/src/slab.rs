@@ -22,16 +22,17 @@ const TOLERANCE: f64 = 0.02;
 /// Steeper slabs are not looked for.
 const STEEPEST: f64 = 4.0;
 
-/// Around the corners of what a map serves. `points` is a buffer.
+/// Around the corners of what a map serves, under parallel light, where planes are planes over (s, t) as well. Under a lamp linear depth bends them, and all of a
+/// map's depths count. `points` is a buffer.
 pub(crate) fn slab(map: &ShadowMap, body: &Body, points: &mut Vec<DVec3>) -> Slab {
+    if map.apex.is_some() {
+        return Slab::default();
+    }
     points.clear();
     let mut texel: f64 = 0.0;
     for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
-        let (st, depth) = (local.shadow.truncate(), local.shadow.z);
-        let linear = map.linear_depth(st, depth);
-        let before = depth - local.footprint().longest() * local.depth_per_metre;
-        texel = texel.max(linear - map.linear_depth(st, before));
-        points.push(st.extend(linear));
+        texel = texel.max(local.footprint().longest() * local.depth_per_metre);
+        points.push(local.shadow);
     }
     let slope = thinnest(points);
     let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));

@@ -89,7 +89,9 @@ fn steady_frames_do_not_allocate() {
     }
     let stable = Options { warp: Warp::Stable, partition: partitions[1], ..Options::default() };
     let by_error = Options { size: Size::MaxError(20.0), partition: four, ..Options::default() };
-    cases.extend([(&lights[..], stable), (&lights[..], by_error)]);
+    let soft =
+        Options { keeps_casters: true, reach_texels: 16, partition: four, ..Options::default() };
+    cases.extend([(&lights[..], stable), (&lights[..], by_error), (&lights[..], soft)]);
     for (lights, options) in cases {
         let mut planner = Planner::new();
         let mut orbit = || {

@@ -56,6 +56,8 @@ proptest! {
             prop_assert!((-slack_s..=1.0 + slack_s).contains(&shadow.x), "{name}: s = {}", shadow.x);
             prop_assert!((-slack_t..=1.0 + slack_t).contains(&shadow.y), "{name}: t = {}", shadow.y);
             prop_assert!((-1e-6..=1.0 + 1e-6).contains(&shadow.z), "{name}: depth = {}", shadow.z);
+            let in_slab = map.slab_depth(shadow.truncate(), shadow.z);
+            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&in_slab), "{name}: depth in the slab = {in_slab}");
             let bound = 1.0 + 1e-6;
             prop_assert!(error.s <= map.error.max_s * bound, "{name}: s {} > {}", error.s, map.error.max_s);
             prop_assert!(error.t <= map.error.max_t * bound, "{name}: t {} > {}", error.t, map.error.max_t);

@@ -327,7 +327,11 @@ fn arrow(theta_rad: f64, [left, top]: [i32; 2]) -> Result<String> {
 }
 
 /// A picture as part of the SVG, its upper left corner at `at`.
-fn embedded<P: PngPixel>([x, y]: [i32; 2], [w, h]: [i32; 2], image: &Image<P>) -> Result<String> {
+pub(super) fn embedded<P: PngPixel>(
+    [x, y]: [i32; 2],
+    [w, h]: [i32; 2],
+    image: &Image<P>,
+) -> Result<String> {
     let data = STANDARD.encode(png(image)?);
     Ok(format!(
         "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" href=\"data:image/png;base64,{data}\"/>\n"

@@ -200,7 +200,8 @@ pub(super) fn fig6() -> Result<Figure> {
         name: "csm-fig6",
         title: "How many terms a shadow needs".into(),
         source: "Annen, Mertens, Bekaert, Seidel and Kautz 2007, Figure 6",
-        text: "First the built-in scene `contacts`, really rendered, with 8-bit basis images of 512² texels, no blur and no leak reduction; then the same from the                closed form: the ground as the light sees it, with the shadows of two squares and of a polygon that rises from where \
+        text: "First the built-in scene `contacts`, really rendered, with 8-bit basis images of 512² texels, no blur and no leak reduction; then the same from the \
+               closed form: the ground as the light sees it, with the shadows of two squares and of a polygon that rises from where \
                it touches the ground. One square hangs at a height of 0.45 of the depth range, the one below it at 0.15, \
                which is within the step's slope for small M, so light passes where there should be none. The \
                slanted polygon shows the whole slope at once, bright at its contact and dark beyond; the curves are a \

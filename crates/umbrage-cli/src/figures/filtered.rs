@@ -5,28 +5,25 @@ use super::{Figure, File};
 use anyhow::Result;
 use glam::DVec3;
 use umbrage::Light;
-use umbrage_scene::Scene;
+use umbrage_measure::{Image, Rgb};
 use umbrage_trace::Tracer;
 
-/// Two trees in low light from the side, whose shadows lie long and thin on the grass.
-fn trees() -> Result<Scene> {
-    Ok(umbrage_scene::builtin("grove", Some(2))?)
-}
-
-fn shot<'a>(scene: &Scene, tracer: &'a Tracer<'a>) -> Result<Shot<'a>> {
+/// Two trees in low light from the side, whose shadows lie long and thin on the grass, under some techniques.
+fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
+    let scene = umbrage_scene::builtin("grove", Some(2))?;
+    let tracer = Tracer::new(&scene)?;
     let light = Light::Directional { direction: DVec3::new(0.8, -0.55, 0.5) };
-    Shot::new(scene, tracer, light, |look| {
+    let shot = Shot::new(&scene, &tracer, light, |look| {
         look.eye = DVec3::new(9.0, 5.0, 13.0);
         look.target = DVec3::new(4.9, 0.5, 0.6);
         look.fov_y_rad = 0.22;
-    })
+    })?;
+    let picture = |(label, spec): &(String, String)| Ok((label.clone(), shot.picture(spec)?));
+    techniques.iter().map(picture).collect()
 }
 
 /// CSM, Fig. 7.
 pub(super) fn fig7() -> Result<Figure> {
-    let scene = trees()?;
-    let tracer = Tracer::new(&scene)?;
-    let shot = shot(&scene, &tracer)?;
     let filters = [
         ("(a) bilinear comparisons", "pcf2"),
         ("(b) CSM, no blur", "csm16"),
@@ -35,10 +32,8 @@ pub(super) fn fig7() -> Result<Figure> {
         ("(e) CSM, 7 × 7", "csm16(blur=7)"),
         ("(f) CSM, 0.15 m wide", "csm16(blur=0.15m)"),
     ];
-    let pictures = filters.map(|(label, filter)| {
-        Ok((label.to_owned(), shot.picture(&format!("uniform:{filter}@512"))?))
-    });
-    let pictures = pictures.into_iter().collect::<Result<Vec<_>>>()?;
+    let techniques = filters.map(|(label, f)| (label.to_owned(), format!("uniform:{f}@512")));
+    let pictures = trees(&techniques)?;
     let svg = sheet("Thin shadows under different filters", 3, &pictures)?;
     Ok(Figure {
         name: "csm-fig7",
@@ -55,16 +50,14 @@ pub(super) fn fig7() -> Result<Figure> {
 
 /// CSM, Fig. 8.
 pub(super) fn fig8() -> Result<Figure> {
-    let scene = trees()?;
-    let tracer = Tracer::new(&scene)?;
-    let shot = shot(&scene, &tracer)?;
-    let mut pictures = Vec::new();
+    let mut techniques = Vec::new();
     for blur in [1, 3, 7] {
         for side in [256, 512, 1024] {
-            let picture = shot.picture(&format!("uniform:csm16(blur={blur})@{side}"))?;
-            pictures.push((format!("{side}², blur of {blur}"), picture));
+            let spec = format!("uniform:csm16(blur={blur})@{side}");
+            techniques.push((format!("{side}², blur of {blur}"), spec));
         }
     }
+    let pictures = trees(&techniques)?;
     let svg = sheet("Resolutions and blurs", 3, &pictures)?;
     Ok(Figure {
         name: "csm-fig8",

@@ -1,5 +1,5 @@
-//! `umbrage figures`: the papers' figures and tables once more, from the closed forms and from maps that
-//! were really planned.
+//! `umbrage figures`: the papers' figures and tables once more, from the closed forms, and from maps that
+//! were really planned and rendered.
 
 mod aliasing;
 mod chart;

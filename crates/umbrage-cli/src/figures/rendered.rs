@@ -1,13 +1,12 @@
 //! Pictures of shadows that were really rendered, side by side.
 
+use super::aliasing::embedded;
 use crate::pixels::{self, Rows, Shadowed};
 use crate::spec::Technique;
-use anyhow::{Context, Result};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use anyhow::Result;
 use std::fmt::Write;
 use umbrage::{Bounds, Camera, Light, LookAt};
-use umbrage_measure::{Image, Rgb, png};
+use umbrage_measure::{Image, Rgb};
 use umbrage_scene::Scene;
 use umbrage_trace::{Reference, Tracer, View};
 
@@ -82,16 +81,9 @@ pub(super) fn sheet(
     for (i, (label, picture)) in pictures.iter().enumerate() {
         let x = GAP + (i % columns) as u32 * (TILE[0] + GAP);
         let y = super::chart::TITLE_HEIGHT + (i / columns) as u32 * (TILE[1] + LABEL + GAP);
-        let data = BASE64_STANDARD.encode(png(picture)?);
-        writeln!(
-            svg,
-            "<image x=\"{x}\" y=\"{y}\" width=\"{}\" height=\"{}\" href=\"data:image/png;base64,{data}\"/>\n<text x=\"{}\" y=\"{}\">{label}</text>",
-            TILE[0],
-            TILE[1],
-            x + TILE[0] / 2,
-            y + TILE[1] + 16
-        )
-        .context("text")?;
+        let [x, y, w, h] = [x, y, TILE[0], TILE[1]].map(|n| n as i32);
+        svg += &embedded([x, y], [w, h], picture)?;
+        writeln!(svg, "<text x=\"{}\" y=\"{}\">{label}</text>", x + w / 2, y + h + 16)?;
     }
     svg += "</svg>\n";
     Ok(svg)

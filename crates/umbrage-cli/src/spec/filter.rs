@@ -51,7 +51,9 @@ impl FromStr for BlurWidth {
     fn from_str(text: &str) -> Result<Self> {
         let number = |digits: &str| match digits.parse::<f32>() {
             Ok(w) if w > 0.0 && w <= 1e6 => Ok(w),
-            _ => bail!("`blur={text}` must be a positive number, as in blur=1.5px or blur=0.2m"),
+            _ => bail!(
+                "`blur={text}` must be a positive number, at most 1e6, as in blur=1.5px or blur=0.2m"
+            ),
         };
         if let Some(pixels) = text.strip_suffix("px") {
             return number(pixels).map(Self::Pixels);
@@ -134,12 +136,12 @@ impl FromStr for LightSize {
     fn from_str(text: &str) -> Result<Self> {
         let number = |digits: &str, most: f32| match digits.parse::<f32>() {
             Ok(size) if size > 0.0 && size <= most => Ok(size),
-            _ => bail!("`light={text}` must be a positive size, as in light=0.53deg or light=0.2m"),
+            _ => bail!("`light={text}` must be above 0 and at most {most}"),
         };
         match (text.strip_suffix("deg"), text.strip_suffix('m')) {
             (Some(degrees), _) => number(degrees, 90.0).map(Self::Degrees),
             (_, Some(metres)) => number(metres, 1e6).map(Self::Metres),
-            _ => number("", 0.0).map(Self::Metres),
+            _ => bail!("`light={text}` must have a unit, as in light=0.53deg or light=0.2m"),
         }
     }
 }
@@ -159,6 +161,16 @@ const DEFAULT_SAMPLES: u32 = 6;
 const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "evsm2", "msm", "csm", "pcss"];
 
 impl Filter {
+    /// Whether the light's size, if it has one, is a sun's: an angle, as is the default.
+    pub(super) fn is_under_sun(&self) -> bool {
+        match self {
+            Self::Pcss(options) => {
+                !options.iter().any(|o| matches!(o, FilterOption::Light(LightSize::Metres(_))))
+            }
+            _ => true,
+        }
+    }
+
     /// What executes it, or why this version cannot.
     pub(super) fn executable(&self) -> Result<visibility::Filter> {
         let (statistic, options) = match self {

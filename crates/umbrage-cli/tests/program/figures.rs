@@ -257,3 +257,18 @@ fn side_views_and_their_pictures_are_complete() {
         assert_eq!(svg.unwrap().matches("href=\"data:image/png;base64,").count(), 20);
     }
 }
+
+#[test]
+fn filters_are_really_rendered() {
+    let desk = Desk::new();
+    make(&desk, &["csm-fig6", "csm-fig7", "csm-fig8"]);
+    for (file, count) in [("csm-fig6-rendered", 10), ("csm-fig7", 6), ("csm-fig8", 9)] {
+        let svg = std::fs::read_to_string(desk.path(&format!("figures/{file}.svg"))).unwrap();
+        let pictures: std::collections::HashSet<&str> = svg
+            .split("data:image/png;base64,")
+            .skip(1)
+            .map(|p| p.split('"').next().unwrap())
+            .collect();
+        assert_eq!(pictures.len(), count, "{file}: pictures that differ");
+    }
+}

@@ -28,9 +28,11 @@ fn shadow_footprint(receiver: ShadowReceiver) -> ShadowFootprint {
         axis = vec2f(half_difference + spread, covariance.z);
     }
     let axis_length = length(axis);
-    axis = select(vec2f(1.0, 0.0), axis / axis_length, axis_length > 0.0) * exp2(level);
+    axis = select(vec2f(1.0, 0.0), axis / axis_length, axis_length > 0.0);
     let least = max({SAMPLE_VARIANCE} * texel, minor);
-    let wide = vec3f(max(covariance.xy, vec2f(least)), covariance.z);
+    let longer = max(major - least, 0.0);
+    let wide = vec3f(vec2f(least) + longer * axis * axis, longer * axis.x * axis.y);
+    axis *= exp2(level);
     let samples = vec2u(u32(along.x), u32(across.x));
     return ShadowFootprint(i32(level), samples, axis * along.y, vec2f(-axis.y, axis.x) * across.y, wide);
 }

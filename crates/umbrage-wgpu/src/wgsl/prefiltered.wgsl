@@ -55,6 +55,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let variance = footprint.covariance.x * slope.x * slope.x + footprint.covariance.y * slope.y * slope.y
         + 2.0 * footprint.covariance.z * slope.x * slope.y;
     let plane = {PLANE_DEVIATIONS} * sqrt(max(variance, 0.0));
-    let depth = shadow_slab_depth(beam_scale, slab, receiver.texel, expected) - plane;
+    // What is stored lies between 0 and 1, and periods end there.
+    let depth = clamp(shadow_slab_depth(beam_scale, slab, receiver.texel, expected) - plane, 0.0, 1.0);
     return clamp(shadow_reconstruct(numbers, depth), 0.0, 1.0);
 }

@@ -28,8 +28,8 @@
 //!
 //! # Filters that are applied ahead of lookup
 //!
-//! [`Prefilter`] stores numbers in place of depth whose means over many texels tell the lit share ([`statistic`]). They are blurred once a map,
-//! and a lookup is one bilinear sample. The same slack applies. What cannot tell the receiver's own slanted plane from
+//! [`Prefilter`] stores numbers in place of depth whose means over many texels tell the lit share ([`statistic`]). A blur in texels is done once
+//! a map, and a lookup is one bilinear sample; one in pixels or metres takes several, of smaller and smaller copies. The same slack applies. What cannot tell the receiver's own slanted plane from
 //! occluders also allows for a multiple of that plane's deviation over the filter.
 
 pub mod statistic;
@@ -74,7 +74,7 @@ pub enum Filter {
     /// Percentage-closer filtering over a width that knows the warp: n × n comparisons with the nearest texels, spread evenly over a square across the
     /// light or in the picture, or over a texel where that is wider.
     Spread {
-        /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
+        /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF), or [`MAX_DISC`](Self::MAX_DISC) in a disc.
         n: u32,
         /// Side of the square, or diameter of the disc.
         width: Width,
@@ -184,6 +184,13 @@ impl Filter {
     pub fn drawn_texels(self, resolution: [u32; 2]) -> [u32; 2] {
         let gutters = 2 * self.reach_texels();
         resolution.map(|n| n.saturating_add(gutters).next_multiple_of(self.align_texels()))
+    }
+
+    /// Sides of what a map takes in an atlas, between gutters of [`reach_texels`](Self::reach_texels): its resolution, and what that is rounded up to
+    /// ([`drawn_texels`](Self::drawn_texels)). In an atlas of such rectangles maps begin where smaller copies ask for it.
+    pub fn slot_texels(self, resolution: [u32; 2]) -> [u32; 2] {
+        let gutters = 2 * self.reach_texels();
+        self.drawn_texels(resolution).map(|n| n - gutters)
     }
 
     /// That the parameters make sense.

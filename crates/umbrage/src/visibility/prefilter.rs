@@ -215,11 +215,16 @@ impl Prefilter {
         let axis = axis.try_normalize().unwrap_or(DVec2::X);
         let size = level.exp2();
         let least = (Footprint::SAMPLE_VARIANCE * texel).max(minor);
+        let longer = (major - least).max(0.0);
         Footprint {
             level: level as u32,
             samples: [along, across],
             steps: [axis * (step * size), axis.perp() * (step_across * size)],
-            covariance: [ss.max(least), tt.max(least), st],
+            covariance: [
+                least + longer * axis.x * axis.x,
+                least + longer * axis.y * axis.y,
+                longer * axis.x * axis.y,
+            ],
         }
     }
 
@@ -282,7 +287,7 @@ impl Prefilter {
         let [width, height] = map.resolution.map(f64::from);
         let expected = receiver.depth.min(1.0) - receiver.half_texel;
         // Edge-on to the light the slope has no end: 8 in a texel is as good as infinite where all of depth is 1.
-        let texels = DVec2::new(width, height);
+        let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
         let steepest = 8.0 * texels;
         let slope = receiver.slope.clamp(-steepest, steepest);
         let slope = map.slab_slope(receiver.st, expected, slope) / texels;
@@ -290,7 +295,8 @@ impl Prefilter {
         let variance =
             ss * slope.x * slope.x + tt * slope.y * slope.y + 2.0 * st * slope.x * slope.y;
         let plane = f64::from(self.statistic.plane_deviations()) * variance.max(0.0).sqrt();
-        let depth = map.slab_depth(receiver.st, expected) - plane;
+        // What is stored lies between 0 and 1, and periods end there.
+        let depth = (map.slab_depth(receiver.st, expected) - plane).clamp(0.0, 1.0);
         self.statistic.visibility(channels, depth as f32)
     }
 }

@@ -12,8 +12,33 @@ fn flat(s: f64, t: f64, depth: f64) -> Receiver {
     Receiver { st: DVec2::new(s, t), depth, ..Receiver::default() }
 }
 
+/// Those that compare depths.
+fn comparing() -> impl Iterator<Item = Filter> {
+    let boxes = (1..=Filter::MAX_PCF).map(|n| Filter::pcf(n).unwrap());
+    let widths = [Width::Metres(0.3), Width::Pixels(1e6)];
+    let spread = widths.into_iter().flat_map(|width| {
+        [Pattern::Grid, Pattern::Poisson].map(|pattern| Filter::Spread { n: 3, width, pattern })
+    });
+    let soft = [0.01, 1e6].map(|source| Filter::Pcss { n: 3, source });
+    std::iter::once(Filter::Hard).chain(boxes).chain(spread).chain(soft)
+}
+
+/// All kinds.
 fn filters() -> impl Iterator<Item = Filter> {
-    std::iter::once(Filter::Hard).chain((1..=Filter::MAX_PCF).map(|n| Filter::pcf(n).unwrap()))
+    use statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
+    let statistics = [
+        Statistic::Vsm(Vsm::default()),
+        Statistic::Esm(Esm::default()),
+        Statistic::Evsm(Evsm::default()),
+        Statistic::Msm(Msm::default()),
+        Statistic::Csm(Csm::new(3, 0.0, false, true).unwrap()),
+    ];
+    let prefiltered = statistics.into_iter().enumerate().map(|(i, statistic)| {
+        let blurs = [Blur::Texels(5), Blur::Width(Width::Metres(1e6)), Blur::Texels(1)];
+        let (blur, half) = (blurs[i % 3], i % 2 == 1);
+        Filter::Prefiltered(Prefilter { statistic, blur, half })
+    });
+    comparing().chain(prefiltered)
 }
 
 #[test]
@@ -90,7 +115,7 @@ proptest! {
                 let center = DVec2::new((f64::from(i) + 0.5) / 37.0, rows.t_from_row(row));
                 (0.4 + slope.dot(center - receiver.st)).clamp(1e-7, 1.0) as f32
             };
-            for filter in filters() {
+            for filter in comparing() {
                 prop_assert_eq!(visibility(&map, filter, &receiver, stored), 1.0);
             }
         }
@@ -108,7 +133,16 @@ proptest! {
             (DVec2::NAN, DVec2::NAN),
         ] {
             for filter in filters() {
-                let receiver = Receiver { st, depth, slope, half_texel, ..Receiver::default() };
+                let receiver = Receiver {
+                    st,
+                    depth,
+                    slope,
+                    half_texel,
+                    level_slope: slope,
+                    depth_per_metre: ds,
+                    texel_metric: [s, t, dt],
+                    pixel_metric: [ds * ds, dt * dt, ds * dt],
+                };
                 let v = visibility(&map([3, 3], Rows::Even), filter, &receiver, |_, _| stored);
                 prop_assert!((0.0..=1.0).contains(&v), "{v}");
             }
@@ -119,7 +153,7 @@ proptest! {
 #[test]
 fn outside_the_map_or_its_depths_there_is_light() {
     let all_dark = |_, _| 0.0;
-    for filter in filters() {
+    for filter in comparing() {
         for (s, t) in [(-1e-5, 0.5), (1.0 + 1e-5, 0.5), (0.5, -3.0), (0.5, 1.1)] {
             assert_eq!(
                 visibility(&map([8, 8], Rows::Even), filter, &flat(s, t, 0.5), all_dark),
