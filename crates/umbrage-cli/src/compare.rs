@@ -55,7 +55,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 
 fn table(report: &Report) -> String {
     type Column = (&'static str, fn(&Measured) -> String);
-    const COLUMNS: [Column; 17] = [
+    const COLUMNS: [Column; 18] = [
         ("shadows", |r| r.shadows.clone()),
         ("maps", |r| r.maps.to_string()),
         ("texels", |r| r.texels.to_string()),
@@ -72,11 +72,13 @@ fn table(report: &Report) -> String {
         ("culled", |r| percent(r.casters_culled)),
         ("plan ms", |r| number(r.ms.plan, 3)),
         ("depth ms", |r| number(r.ms.depth, 0)),
+        ("filter ms", |r| number(r.ms.filter, 0)),
         ("shade ms", |r| number(r.ms.shade, 0)),
     ];
     let is_measured = |name: &str| match name {
         "flicker" => report.motion.is_some(),
         "noise" => report.results.iter().any(|r| r.noise.is_some()),
+        "filter ms" => report.results.iter().any(|r| r.ms.filter.is_some()),
         _ => true,
     };
     let columns = || COLUMNS.iter().filter(|(name, _)| is_measured(name));

@@ -294,7 +294,14 @@ struct Scratch {
     outline: Vec<DVec2>,
     worst: worst::Scratch,
     casters: Body,
-    points: Vec<DVec3>,
+    /// (s, t, depth) of a body's corners.
+    corners: Vec<DVec3>,
+}
+
+/// How wide a texel is, and how much that is in depth, laid along the beam.
+struct Texel {
+    metres: f64,
+    depth: f64,
 }
 
 impl Scratch {
@@ -380,6 +387,19 @@ impl Scratch {
         unit_errors(map, body, camera)
     }
 
+    /// The largest texel at the body's corners, which are kept.
+    fn texels(&mut self, map: &ShadowMap, body: &Body) -> Texel {
+        self.corners.clear();
+        let mut largest = Texel { metres: 0.0, depth: 0.0 };
+        for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
+            let metres = local.footprint().longest();
+            largest.metres = largest.metres.max(metres);
+            largest.depth = largest.depth.max(metres * local.depth_per_metre);
+            self.corners.push(local.shadow);
+        }
+        largest
+    }
+
     /// How far before depth 0 the first of what can cast into a map lies, in depth, ≥ 0.
     fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
         let body = &mut self.casters;
@@ -436,23 +456,21 @@ impl Scratch {
                 set(map, larger);
             }
         }
-        if draft.still.is_none() {
-            map.begin_earlier(MARGIN_TEXELS * texel_depth(map, &draft.body));
-        }
-        if options.reach_texels > 0 {
-            let reach = f64::from(options.reach_texels) * widest_texel(map, &draft.body);
-            map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
-        }
-        if let Some(casters) = bounds.casters
-            && options.keeps_casters
-        {
-            map.begin_earlier(self.nearest_caster(map, draft, casters));
-        }
-        if draft.still.is_none() {
-            // A map of the whole scene stays as it is whatever is seen of it.
-            if options.warp != Warp::Unfocused {
-                map.slab = slab(map, &draft.body, &mut self.points);
-            }
+        let texel = self.texels(map, &draft.body);
+        let reach = f64::from(options.reach_texels) * texel.metres;
+        map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
+        // A still map has its own margin.
+        let margin = if draft.still.is_none() { MARGIN_TEXELS * texel.depth } else { 0.0 };
+        let earlier = match bounds.casters.filter(|_| options.keeps_casters) {
+            Some(casters) => margin.max(self.nearest_caster(map, draft, casters)),
+            None => margin,
+        };
+        map.begin_earlier(earlier);
+        // Planes bend in a lamp's linear depth, and a map of the whole scene stays as it is whatever is seen of it.
+        if draft.still.is_none() && map.apex.is_none() && options.warp != Warp::Unfocused {
+            let scale = 1.0 / (1.0 + earlier);
+            self.corners.iter_mut().for_each(|c| c.z = (c.z + earlier) * scale);
+            map.slab = slab(&self.corners, texel.depth * scale);
         }
         let height = f64::from(camera.image()[1]);
         map.storage_factor =
@@ -496,21 +514,6 @@ impl ShadowMap {
         let origin = camera.eye();
         *self = Self { origin, cell, caster_planes, pixel_gradient, ..Self::default() };
     }
-}
-
-/// The largest width of a texel, metres.
-fn widest_texel(map: &ShadowMap, body: &Body) -> f64 {
-    let at = |&v: &DVec3| Some(Local::at(map, v)?.footprint().longest());
-    body.vertices().iter().filter_map(at).fold(0.0, f64::max)
-}
-
-/// The largest width of a texel, laid along the beam, in depth.
-fn texel_depth(map: &ShadowMap, body: &Body) -> f64 {
-    let at = |&v: &DVec3| {
-        let local = Local::at(map, v)?;
-        Some(local.footprint().longest() * local.depth_per_metre)
-    };
-    body.vertices().iter().filter_map(at).fold(0.0, f64::max)
 }
 
 /// Largest m_s and m_t of a map at the body's vertices.

@@ -1,9 +1,7 @@
 //! The slab that receivers lie in.
 
-use crate::aliasing::Local;
-use crate::focus::Body;
 use crate::math::range;
-use crate::plan::{ShadowMap, Slab};
+use crate::plan::Slab;
 use glam::{DMat2, DVec2, DVec3};
 
 /// How many texels' widths, laid along the beam, lie between the slab's near side and the receivers: casters before it are taken to lie on it, and a receiver
@@ -22,22 +20,13 @@ const TOLERANCE: f64 = 0.02;
 /// Steeper slabs are not looked for.
 const STEEPEST: f64 = 4.0;
 
-/// Around the corners of what a map serves, under parallel light, where planes are planes over (s, t) as well. Under a lamp linear depth bends them, and all of a
-/// map's depths count. `points` is a buffer.
-pub(crate) fn slab(map: &ShadowMap, body: &Body, points: &mut Vec<DVec3>) -> Slab {
-    if map.apex.is_some() {
-        return Slab::default();
-    }
-    points.clear();
-    let mut texel: f64 = 0.0;
-    for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
-        texel = texel.max(local.footprint().longest() * local.depth_per_metre);
-        points.push(local.shadow);
-    }
-    let slope = thinnest(points);
-    let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));
+/// Around corners of what a map serves, (s, t, depth), under parallel light, where planes are planes over (s, t) as well. `texel_depth`: the largest width of a
+/// texel there, laid along the beam, in depth.
+pub(crate) fn slab(corners: &[DVec3], texel_depth: f64) -> Slab {
+    let slope = thinnest(corners);
+    let (near, far) = range(corners.iter().map(|p| p.z - slope.dot(p.truncate())));
     let thickness = far - near;
-    let margin = (MARGIN_TEXELS * texel).max(MARGIN_SHARE * thickness).max(LEAST_THICKNESS);
+    let margin = (MARGIN_TEXELS * texel_depth).max(MARGIN_SHARE * thickness).max(LEAST_THICKNESS);
     // Behind, nothing but rounding is to be allowed for.
     let whole = margin + thickness + 1e-3 * (margin + thickness);
     let slab = Slab { slope, begin: near - margin, thickness: whole };
@@ -48,22 +37,11 @@ pub(crate) fn slab(map: &ShadowMap, body: &Body, points: &mut Vec<DVec3>) -> Sla
 /// The growth per s and t of the planes between which points (s, t, depth) lie closest together: the ellipsoid method in two dimensions, which converges on
 /// any convex function from its subgradients alone.
 fn thinnest(points: &[DVec3]) -> DVec2 {
-    let mut slope = DVec2::ZERO;
-    let mut ellipse = DMat2::from_diagonal(DVec2::splat(STEEPEST * STEEPEST));
+    let (mut slope, reach) = least_squares(points);
+    let mut ellipse = DMat2::from_diagonal(DVec2::splat(reach * reach));
     let mut best = (f64::INFINITY, slope);
     for _ in 0..64 {
-        let mut near = (f64::INFINITY, DVec2::ZERO);
-        let mut far = (f64::NEG_INFINITY, DVec2::ZERO);
-        for p in points {
-            let st = p.truncate();
-            let depth = p.z - slope.dot(st);
-            if depth < near.0 {
-                near = (depth, st);
-            }
-            if depth > far.0 {
-                far = (depth, st);
-            }
-        }
+        let [near, far] = extremes(points, slope);
         let thickness = far.0 - near.0;
         if thickness < best.0 {
             best = (thickness, slope);
@@ -83,6 +61,49 @@ fn thinnest(points: &[DVec3]) -> DVec2 {
         ellipse = (ellipse - outer * (2.0 / 3.0)) * (4.0 / 3.0);
     }
     best.1
+}
+
+/// Of the points' depths over a sloping plane the least and the greatest, and where they are.
+fn extremes(points: &[DVec3], slope: DVec2) -> [(f64, DVec2); 2] {
+    let mut near = (f64::INFINITY, DVec2::ZERO);
+    let mut far = (f64::NEG_INFINITY, DVec2::ZERO);
+    for p in points {
+        let st = p.truncate();
+        let depth = p.z - slope.dot(st);
+        if depth < near.0 {
+            near = (depth, st);
+        }
+        if depth > far.0 {
+            far = (depth, st);
+        }
+    }
+    [near, far]
+}
+
+/// The slope of the plane nearest to the points in the mean of squares, and how far from it that of the thinnest slab can be.
+fn least_squares(points: &[DVec3]) -> (DVec2, f64) {
+    let n = points.len().max(1) as f64;
+    let mean = points.iter().sum::<DVec3>() / n;
+    let mut covariance = DMat2::ZERO;
+    let mut with_depth = DVec2::ZERO;
+    for p in points {
+        let d = *p - mean;
+        let st = d.truncate();
+        covariance += DMat2::from_cols(st * st.x, st * st.y);
+        with_depth += st * d.z;
+    }
+    let [covariance, with_depth] =
+        [covariance * n.recip(), DMat2::from_cols(with_depth / n, DVec2::ZERO)];
+    let half_difference = 0.5 * (covariance.x_axis.x - covariance.y_axis.y);
+    let least = 0.5 * (covariance.x_axis.x + covariance.y_axis.y)
+        - half_difference.hypot(covariance.x_axis.y);
+    if least.is_nan() || least < 1e-6 {
+        return (DVec2::ZERO, STEEPEST);
+    }
+    let slope = covariance.inverse() * with_depth.x_axis;
+    let [near, far] = extremes(points, slope);
+    // Tilted by so much, a slab is thicker by the points' width in that direction, which is two deviations at least, than twice what it was.
+    (slope, ((far.0 - near.0) / least.sqrt()).min(STEEPEST))
 }
 
 #[cfg(test)]
