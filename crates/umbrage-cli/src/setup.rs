@@ -109,15 +109,7 @@ pub(crate) fn onlooker(args: &ViewArgs, scene: Option<&Scene>) -> Result<Onlooke
         (None, ..) | (_, Some(_), Some(_)) => None,
         (Some(scene), ..) => Some(scene_camera(args, scene)?),
     };
-    let base = own.as_ref().map_or(DEFAULT_VIEW, |c| LookAt {
-        eye: c.eye,
-        target: c.target,
-        up: c.up,
-        fov_y_rad: c.fov_y_rad,
-        near: c.near,
-        far: c.far,
-        image: args.size,
-    });
+    let base = own.as_ref().map_or(DEFAULT_VIEW, |c| c.look_at(args.size));
     let mut look = LookAt {
         eye: args.eye.unwrap_or(base.eye),
         target: args.target.unwrap_or(base.target),

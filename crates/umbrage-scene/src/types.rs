@@ -1,5 +1,5 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
-use umbrage::{Aabb, Light};
+use umbrage::{Aabb, Light, LookAt};
 
 /// Triangles, what they look like, where they stand, and who looks on.
 #[derive(Clone, Debug, Default)]
@@ -117,6 +117,14 @@ pub struct SceneCamera {
     pub near: f64,
     /// Metres; always finite.
     pub far: f64,
+}
+
+impl SceneCamera {
+    /// The view of a picture of so many pixels.
+    pub fn look_at(&self, image: [u32; 2]) -> LookAt {
+        let Self { eye, target, up, fov_y_rad, near, far, .. } = *self;
+        LookAt { eye, target, up, fov_y_rad, near, far, image }
+    }
 }
 
 /// A light of the scene.

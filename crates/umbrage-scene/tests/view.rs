@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
-use umbrage::{Camera, Light, LookAt};
+use umbrage::{Camera, Light};
 use umbrage_scene::{Scene, SceneCamera, builtin, load};
 
 fn real(file: &str) -> Scene {
@@ -16,16 +16,7 @@ fn real(file: &str) -> Scene {
 }
 
 fn camera(view: &SceneCamera) -> Camera {
-    Camera::look_at(LookAt {
-        eye: view.eye,
-        target: view.target,
-        up: view.up,
-        fov_y_rad: view.fov_y_rad,
-        near: view.near,
-        far: view.far,
-        image: [1280, 720],
-    })
-    .unwrap()
+    Camera::look_at(view.look_at([1280, 720])).unwrap()
 }
 
 fn sun_elevation_deg(scene: &Scene) -> f64 {

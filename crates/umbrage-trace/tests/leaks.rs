@@ -7,7 +7,7 @@ use glam::DVec2;
 use std::path::PathBuf;
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, texel_coordinates};
-use umbrage::{Bounds, Camera, LookAt, Options, Plan, Planner, Receiver, Size, Warp};
+use umbrage::{Bounds, Camera, Options, Plan, Planner, Receiver, Size, Warp};
 use umbrage_scene::Scene;
 use umbrage_trace::{DepthMap, Reference, Tracer, View};
 
@@ -42,16 +42,7 @@ fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
 fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let tracer = Tracer::new(scene).unwrap();
     let v = scene.default_view();
-    let camera = Camera::look_at(LookAt {
-        eye: v.eye,
-        target: v.target,
-        up: v.up,
-        fov_y_rad: v.fov_y_rad,
-        near: v.near,
-        far: v.far,
-        image: [480, 270],
-    })
-    .unwrap();
+    let camera = Camera::look_at(v.look_at([480, 270])).unwrap();
     let light = scene.default_light().light;
     let boxes = tracer.boxes(256);
     let bounds = Bounds { receiver_parts: &boxes, ..Bounds::of_scene(scene.bounds()) };

@@ -32,15 +32,7 @@ impl<'a> Shot<'a> {
         look: impl FnOnce(&mut LookAt),
     ) -> Result<Self> {
         let v = scene.default_view();
-        let mut view = LookAt {
-            eye: v.eye,
-            target: v.target,
-            up: v.up,
-            fov_y_rad: v.fov_y_rad,
-            near: v.near,
-            far: v.far,
-            image: TILE,
-        };
+        let mut view = v.look_at(TILE);
         look(&mut view);
         let camera = Camera::look_at(view)?;
         Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })

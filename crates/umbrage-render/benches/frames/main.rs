@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use umbrage::visibility::statistic::{Csm, Statistic};
 use umbrage::visibility::{Blur, Filter, Prefilter, Width};
-use umbrage::{Bounds, Camera, Light, LookAt, Options, Partition, Plan, Planner, Size, Warp};
+use umbrage::{Bounds, Camera, Light, Options, Partition, Plan, Planner, Size, Warp};
 use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -40,15 +40,7 @@ struct Set<'a> {
 impl<'a> Set<'a> {
     fn new(gpu: &'a Gpu, scene: &'a Scene, image: [u32; 2]) -> Result<Self, Failure> {
         let v = scene.default_view();
-        let camera = Camera::look_at(LookAt {
-            eye: v.eye,
-            target: v.target,
-            up: v.up,
-            fov_y_rad: v.fov_y_rad,
-            near: v.near,
-            far: v.far,
-            image,
-        })?;
+        let camera = Camera::look_at(v.look_at(image))?;
         let boxes = Tracer::new(scene)?.boxes(256);
         let light = scene.default_light().light;
         Ok(Self { gpu, scene, buffers: SceneBuffers::new(gpu, scene, true)?, camera, light, boxes })

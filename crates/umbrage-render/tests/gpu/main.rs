@@ -6,7 +6,7 @@ mod trouble;
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Plan, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, Options, Plan, Planner};
 use umbrage_render::Gpu;
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -44,15 +44,7 @@ impl<'a> Set<'a> {
     pub(crate) fn new(scene: &'a Scene, image: [u32; 2]) -> Self {
         let tracer = Tracer::new(scene).unwrap();
         let v = scene.default_view();
-        let look = LookAt {
-            eye: v.eye,
-            target: v.target,
-            up: v.up,
-            fov_y_rad: v.fov_y_rad,
-            near: v.near,
-            far: v.far,
-            image,
-        };
+        let look = v.look_at(image);
         let boxes = tracer.boxes(64);
         Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes }
     }
