@@ -4,7 +4,8 @@ use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, scene};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
-use umbrage::visibility::{Filter, texel_coordinates, visibility};
+use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
+use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width, texel_coordinates, visibility};
 use umbrage::{Faces, Objective, Options, Partition, Plan, Size, Splits, Warp};
 use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
@@ -156,6 +157,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 /// Depths without a pattern make every texel count: whoever looks one texel beside, or mixes up rows, layers, gutters or
 /// weights, is found out. What is left are points on the border of a texel, to single precision.
 fn agrees(shadow_options: &ShadowOptions, options: &Options, origin: Option<DVec3>) {
+    agrees_to(2e-3, 500, shadow_options, options, origin);
+}
+
+/// Visibility is the same to a `tolerance`, but for one point in so many.
+fn agrees_to(
+    tolerance: f64,
+    one_in: usize,
+    shadow_options: &ShadowOptions,
+    options: &Options,
+    origin: Option<DVec3>,
+) {
     let bench = bench();
     let lights = lights();
     let lights = if options.partition.faces == Faces::Whole { &lights[..] } else { &lights[..1] };
@@ -180,11 +192,11 @@ fn agrees(shadow_options: &ShadowOptions, options: &Options, origin: Option<DVec
             served += usize::from(plan.lookup(light, p).next().is_some());
             let expected = expected(&shadows, &plan, light, p, n);
             assert!((0.0..=1.0).contains(&out), "{p}: {out}");
-            wrong += usize::from((f64::from(out) - expected).abs() > 2e-3);
+            wrong += usize::from((f64::from(out) - expected).abs() > tolerance);
         }
     }
     assert!(served > 800, "{options:?}: {served}");
-    assert!(wrong * 500 <= served, "{shadow_options:?} {options:?}: {wrong} of {served}");
+    assert!(wrong * one_in <= served, "{shadow_options:?} {options:?}: {wrong} of {served}");
 }
 
 #[test]
@@ -206,6 +218,38 @@ fn every_filter_and_layout_is_looked_up_as_in_rust() {
         agrees(&hard, &options, None);
         // The nearest texel alone has one depth to compare with, whoever compares.
         agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &options, None);
+    }
+}
+
+/// Widths in pixels and metres, soft shadows: of the many texels that a point compares, one may lie on a border.
+#[test]
+fn comparisons_over_a_width_are_those_of_rust() {
+    let mut options = options(Warp::Lispsm, Partition::slices(2));
+    options.keeps_casters = true;
+    let widths = [Width::Pixels(20.0), Width::Metres(0.7)];
+    let spread = widths.into_iter().flat_map(|width| {
+        [Pattern::Grid, Pattern::Poisson].map(|pattern| Filter::Spread { n: 4, width, pattern })
+    });
+    for filter in spread.chain([Filter::Pcss { n: 4, source: 0.05 }]) {
+        let shadow_options = ShadowOptions { filter, ..Default::default() };
+        agrees_to(1.5 / 16.0, 200, &shadow_options, &options, None);
+    }
+}
+
+/// Numbers in smaller and smaller copies, at several places: in single precision, and in 8 bits to what these can tell.
+#[test]
+fn numbers_over_a_width_are_those_of_rust() {
+    let options = options(Warp::Lispsm, Partition::slices(2));
+    let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
+    for (statistic, tolerance) in [(Statistic::Vsm(Vsm::default()), 1e-3), (csm, 1e-2)] {
+        for width in [Width::Pixels(12.0), Width::Metres(0.7)] {
+            for half in [false, true] {
+                let blur = Blur::Width(width);
+                let filter = Filter::Prefiltered(Prefilter { statistic, blur, half });
+                let shadow_options = ShadowOptions { filter, ..Default::default() };
+                agrees_to(tolerance, 200, &shadow_options, &options, None);
+            }
+        }
     }
 }
 
