@@ -42,16 +42,22 @@ struct LightJson {
 
 /// As [`Slab`] has it.
 #[derive(Serialize)]
-struct SlabJson {
-    slope: [f64; 2],
-    begin: f64,
-    thickness: f64,
+#[serde(untagged)]
+enum SlabJson {
+    Leaning { slope: [f64; 2], begin: f64, thickness: f64 },
+    Distances { axis: [f64; 3], near: f64, far: f64 },
 }
 
 impl From<Slab> for SlabJson {
     fn from(slab: Slab) -> Self {
-        let Slab { slope, begin, thickness } = slab;
-        Self { slope: slope.to_array(), begin, thickness }
+        match slab {
+            Slab::Leaning { slope, begin, thickness } => {
+                Self::Leaning { slope: slope.to_array(), begin, thickness }
+            }
+            Slab::Distances { axis, near, far } => {
+                Self::Distances { axis: axis.to_array(), near, far }
+            }
+        }
     }
 }
 
@@ -67,7 +73,7 @@ struct MapJson {
     /// `null`: no warp.
     lambda: Option<f64>,
     error: ErrorJson,
-    /// Where receivers lie in linear depth, for filters that store functions of it.
+    /// Where receivers lie along the beams, for filters that store functions of depth.
     slab: SlabJson,
     /// Index along the view, from the viewer.
     slice: usize,

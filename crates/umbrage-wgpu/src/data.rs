@@ -197,11 +197,23 @@ fn beam_scale(map: &ShadowMap) -> Vec4 {
     DVec4::new(w.x / width, w.y / height, w.z, w.w).as_vec4()
 }
 
-/// Growth of the slab's near side per texel in s and t, its near side at texel 0, and one over its thickness.
+/// What `shadow_slab_depth` asks for.
 fn slab(map: &ShadowMap) -> Vec4 {
-    let Slab { slope, begin, thickness } = map.slab;
     let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
-    DVec4::new(slope.x / width, slope.y / height, begin, 1.0 / thickness).as_vec4()
+    match map.slab {
+        Slab::Leaning { slope, begin, thickness } => {
+            DVec4::new(slope.x / width, slope.y / height, begin, 1.0 / thickness)
+        }
+        Slab::Distances { axis, near, far } => {
+            let m = map.local_from_shadow;
+            // Of depth it has none: the lamp is where depth has no end.
+            let apex = axis.dot(map.apex.unwrap_or(DVec3::ZERO));
+            let row = |c: DVec4| (axis.dot(c.truncate()) - apex * c.w) / (far - near);
+            let [s, t, zero] = [row(m.x_axis), row(m.y_axis), row(m.w_axis)];
+            DVec4::new(s / width, t / height, zero, near / (far - near))
+        }
+    }
+    .as_vec4()
 }
 
 /// From render space to a map's local space.

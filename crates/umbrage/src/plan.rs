@@ -193,27 +193,38 @@ pub struct ShadowMap {
     pub apex: Option<DVec3>,
     /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
     pub pixel_gradient: DVec3,
-    /// Where the receivers served lie in [linear depth](Self::linear_depth); all of it for lamps, and for maps that stand still or cover all of the scene.
+    /// Where the receivers served lie along the beams: [`Distances`](Slab::Distances) under lamps, else [`Leaning`](Slab::Leaning).
     pub slab: Slab,
 }
 
-/// What lies between two parallel planes over (s, t): a range of [linear depth](ShadowMap::linear_depth) that follows the ground, and is many times
-/// smaller than the map's own where light falls at a slant. What filters store in place of depth counts from here, so that they spend their digits and
-/// their terms where shadows fall.
+/// A range of depths that holds a map's receivers, as tight as it easily gets: many times smaller than the map's own where light falls at a slant. What filters
+/// store in place of depth counts from here ([`ShadowMap::slab_depth`]), so that they spend their digits and their terms where shadows fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slab {
-    /// Growth of depth at its near side per unit of s and t.
-    pub slope: DVec2,
-    /// Depth of its near side at s = t = 0.
-    pub begin: f64,
-    /// Depth from its near to its far side, > 0.
-    pub thickness: f64,
+pub enum Slab {
+    /// Under parallel light, what lies between two parallel planes over (s, t), which follow the ground.
+    Leaning {
+        /// Growth of depth at its near side per unit of s and t.
+        slope: DVec2,
+        /// Depth of its near side at s = t = 0.
+        begin: f64,
+        /// Depth from its near to its far side, > 0.
+        thickness: f64,
+    },
+    /// Under a lamp, distances from it along an axis.
+    Distances {
+        /// Unit vector, local space.
+        axis: DVec3,
+        /// Metres.
+        near: f64,
+        /// Metres, more than `near`.
+        far: f64,
+    },
 }
 
 /// All of a map's depths.
 impl Default for Slab {
     fn default() -> Self {
-        Self { slope: DVec2::ZERO, begin: 0.0, thickness: 1.0 }
+        Self::Leaning { slope: DVec2::ZERO, begin: 0.0, thickness: 1.0 }
     }
 }
 
@@ -289,18 +300,19 @@ impl ShadowMap {
         (h.w > 0.0).then(|| h.xyz() / h.w)
     }
 
-    /// Depth as a share of the way along the beam through (s, t), 0 and 1 being where the map's depths begin and end. Under parallel light it
-    /// is depth itself; a lamp's perspective makes depth grow ever slower. Where depth 1 is beyond infinity, depth itself.
-    pub fn linear_depth(&self, st: DVec2, depth: f64) -> f64 {
-        let [begin, step] = self.beam_scale(st);
-        let end = begin + step;
-        if begin > 0.0 && end > 0.0 { depth * end / (begin + step * depth) } else { depth }
-    }
-
-    /// [Linear depth](Self::linear_depth) in the [slab](Self::slab) of the receivers: 0 at its near side and 1 at its far side.
+    /// Where a depth lies in the [slab](Self::slab) of the receivers: 0 at its near side and 1 at its far side; linear along the beam.
     pub fn slab_depth(&self, st: DVec2, depth: f64) -> f64 {
-        let Slab { slope, begin, thickness } = self.slab;
-        (self.linear_depth(st, depth) - begin - slope.dot(st)) / thickness
+        match self.slab {
+            Slab::Leaning { slope, begin, thickness } => {
+                (depth - begin - slope.dot(st)) / thickness
+            }
+            Slab::Distances { axis, near, far } => {
+                let h = self.local_from_shadow * st.extend(depth).extend(1.0);
+                let apex = self.apex.unwrap_or(DVec3::ZERO);
+                // What is beyond infinity is behind everything.
+                if h.w > 0.0 { (axis.dot(h.xyz() / h.w - apex) - near) / (far - near) } else { 1.0 }
+            }
+        }
     }
 
     /// How wide the penumbra is of what lies at `depth` on the beam through `st`, for a light of diameter 1: metres across the receiver's beam, for the sun per
@@ -314,20 +326,6 @@ impl ShadowMap {
         // Distances from a lamp go with one over the fourth coordinate.
         let [at, level] = [depth, level].map(|d| there + step * d);
         if level > 0.0 { (at / level - 1.0).clamp(0.0, 1e6) } else { 0.0 }
-    }
-
-    /// How slab depth changes along a surface of this slope, ∂depth/∂(s, t), per unit of s and t.
-    pub(crate) fn slab_slope(&self, st: DVec2, depth: f64, slope: DVec2) -> DVec2 {
-        let [begin, step] = self.beam_scale(st);
-        let (end, here) = (begin + step, begin + step * depth);
-        let mut linear = slope;
-        if begin > 0.0 && end > 0.0 {
-            let w = self.local_from_shadow.row(3);
-            // Of depth · end/here, with respect to depth and to the beam.
-            linear = slope * (begin * end / (here * here))
-                + DVec2::new(w.x, w.y) * (depth * step * (depth - 1.0) / (here * here));
-        }
-        (linear - self.slab.slope) / self.slab.thickness
     }
 
     /// The fourth coordinate of the points of a beam: where depth is 0, and its growth to where depth is 1.

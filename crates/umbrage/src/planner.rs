@@ -11,7 +11,7 @@ use crate::options::{Faces, Objective, Options, Size, Warp};
 use crate::partition::{self, Along};
 use crate::plan::{Face, MapError, Part, Plan, PlannedLight, Rows, ShadowMap, Slab};
 use crate::resolution::{enlarged, resolutions};
-use crate::slab::slab;
+use crate::slab::{all_distances, along_axis, distances, slab};
 use crate::stable::{Still, bounding_sphere};
 use crate::warp::{LightSpace, OnePoint, Seen, psm, theta};
 use crate::worst::{self, worst_errors};
@@ -356,6 +356,7 @@ impl Scratch {
         // Errors at one texel decide the resolution.
         map.resolution = [1, 1];
         map.apex = space.apex;
+        map.slab = along_axis(space);
         let set = |map: &mut ShadowMap, homography: DMat3| {
             let depth = DepthRange::of(covered, homography, space);
             [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, space);
@@ -466,12 +467,18 @@ impl Scratch {
             None => margin,
         };
         map.begin_earlier(earlier);
-        // Planes bend in a lamp's linear depth, and a map of the whole scene stays as it is whatever is seen of it.
-        if draft.still.is_none() && map.apex.is_none() && options.warp != Warp::Unfocused {
-            let scale = 1.0 / (1.0 + earlier);
-            self.corners.iter_mut().for_each(|c| c.z = (c.z + earlier) * scale);
-            map.slab = slab(&self.corners, texel.depth * scale);
-        }
+        // A map that stands still, or covers all of the scene, stays as it is whatever is seen of it.
+        let is_fixed = draft.still.is_some() || options.warp == Warp::Unfocused;
+        map.slab = match map.apex {
+            Some(apex) if is_fixed => all_distances(map, apex),
+            Some(apex) => distances(map, apex, &draft.body, texel.metres),
+            None if is_fixed => Slab::default(),
+            None => {
+                let scale = 1.0 / (1.0 + earlier);
+                self.corners.iter_mut().for_each(|c| c.z = (c.z + earlier) * scale);
+                slab(&self.corners, texel.depth * scale)
+            }
+        };
         let height = f64::from(camera.image()[1]);
         map.storage_factor =
             map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);

@@ -1,8 +1,10 @@
 //! The slab that receivers lie in.
 
+use crate::focus::Body;
 use crate::math::range;
-use crate::plan::Slab;
-use glam::{DMat2, DVec2, DVec3};
+use crate::plan::{ShadowMap, Slab};
+use crate::warp::LightSpace;
+use glam::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
 
 /// How many texels' widths, laid along the beam, lie between the slab's near side and the receivers: casters before it are taken to lie on it, and a receiver
 /// is to tell them from itself.
@@ -29,9 +31,45 @@ pub(crate) fn slab(corners: &[DVec3], texel_depth: f64) -> Slab {
     let margin = (MARGIN_TEXELS * texel_depth).max(MARGIN_SHARE * thickness).max(LEAST_THICKNESS);
     // Behind, nothing but rounding is to be allowed for.
     let whole = margin + thickness + 1e-3 * (margin + thickness);
-    let slab = Slab { slope, begin: near - margin, thickness: whole };
-    let is_sound = slope.is_finite() && slab.begin.is_finite() && whole.is_finite();
+    let slab = Slab::Leaning { slope, begin: near - margin, thickness: whole };
+    let is_sound = slope.is_finite() && near.is_finite() && whole.is_finite();
     if is_sound { slab } else { Slab::default() }
+}
+
+/// Under a lamp: distances along its axis, before they are told ([`distances`], [`all_distances`]).
+pub(crate) fn along_axis(space: &LightSpace) -> Slab {
+    match space.apex {
+        None => Slab::default(),
+        Some(_) => {
+            let axis = space.w.truncate().normalize_or(DVec3::NEG_Z);
+            Slab::Distances { axis, near: 0.0, far: 1.0 }
+        }
+    }
+}
+
+/// Around what a map serves under a lamp at `apex`. `texel`: the largest width of a texel there, metres.
+pub(crate) fn distances(map: &ShadowMap, apex: DVec3, body: &Body, texel: f64) -> Slab {
+    let Slab::Distances { axis, .. } = map.slab else { return map.slab };
+    let (near, far) = range(body.vertices().iter().map(|v| axis.dot(*v - apex)));
+    let margin = (MARGIN_TEXELS * texel).max(MARGIN_SHARE * (far - near)).max(1e-3 * far);
+    // Some way before the lamp itself, and a little behind everything.
+    let slab = Slab::Distances { axis, near: (near - margin).max(0.0), far: far + 1e-3 * far };
+    let is_sound = near.is_finite() && far > 0.0 && far.is_finite() && margin.is_finite();
+    if is_sound { slab } else { all_distances(map, apex) }
+}
+
+/// All of the depths of a map under a lamp, as they are on the beam in its middle; a thousand times as far as they begin where they have no end.
+pub(crate) fn all_distances(map: &ShadowMap, apex: DVec3) -> Slab {
+    let Slab::Distances { axis, .. } = map.slab else { return map.slab };
+    let at = |depth: f64| {
+        let h = map.local_from_shadow * DVec4::new(0.5, 0.5, depth, 1.0);
+        if h.w > 0.0 { axis.dot(h.xyz() / h.w - apex) } else { f64::INFINITY }
+    };
+    let near = at(0.0);
+    let near = if near > 0.0 && near.is_finite() { near } else { 1e-3 };
+    let far = at(1.0);
+    let far = if far > near && far.is_finite() { far } else { 1000.0 * near };
+    Slab::Distances { axis, near, far }
 }
 
 /// The growth per s and t of the planes between which points (s, t, depth) lie closest together: the ellipsoid method in two dimensions, which converges on

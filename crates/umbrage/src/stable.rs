@@ -4,6 +4,7 @@ use crate::camera::Camera;
 use crate::fit::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::light::Lamp;
 use crate::plan::ShadowMap;
+use crate::slab::along_axis;
 use crate::warp::LightSpace;
 use glam::{DMat3, DVec3, DVec4};
 
@@ -73,6 +74,7 @@ impl Still {
         let homography = DMat3::from_cols(s, t, DVec3::Z).transpose();
         [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &self.space);
         map.apex = self.space.apex;
+        map.slab = along_axis(&self.space);
         if let Covers::Pyramid { slope, inverse_depths: [far, near] } = self.covers {
             // A texel there is 2 slope/res of the way to the lamp wide, and 1/depth grows by as much.
             let shortest = map.resolution[0].min(map.resolution[1]);

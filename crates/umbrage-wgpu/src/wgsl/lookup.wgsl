@@ -40,9 +40,8 @@ struct ShadowMap {
     w: vec4f,
     // Before this plane's negative side the map does not fade.
     fade_from: vec4f,
-    // See `shadow_linear_depth`.
-    beam_scale: vec4f,
     // See `shadow_slab_depth`.
+    beam_scale: vec4f,
     slab: vec4f,
     // Texels of the map, and of the texture at which it begins.
     size: vec2f,

@@ -47,15 +47,15 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {
     let at = (clamp(receiver.texel, low, high) + origin) * shadow_settings.texture_scale;
     let numbers = array<vec4f, {TEXTURES}>({SAMPLES});
 //END
-    // How much the receiver's own plane varies over the filter, as far as the numbers cannot tell it from occluders.
+    // How much the receiver's own plane varies over the filter, over the slab's planes, as far as the numbers cannot tell it from occluders.
     let beam_scale = shadow_maps[map].beam_scale;
     let slab = shadow_maps[map].slab;
-    let expected = min(receiver.depth, 1.0) - receiver.slack;
-    let slope = shadow_slab_slope(beam_scale, slab, receiver.texel, expected, receiver.slope);
+    let slope = receiver.slope - select(vec2f(0.0), slab.xy, beam_scale.z == 0.0);
     let variance = footprint.covariance.x * slope.x * slope.x + footprint.covariance.y * slope.y * slope.y
         + 2.0 * footprint.covariance.z * slope.x * slope.y;
     let plane = {PLANE_DEVIATIONS} * sqrt(max(variance, 0.0));
+    let expected = min(receiver.depth, 1.0) - receiver.slack - plane;
     // What is stored lies between 0 and 1, and periods end there.
-    let depth = clamp(shadow_slab_depth(beam_scale, slab, receiver.texel, expected) - plane, 0.0, 1.0);
+    let depth = clamp(shadow_slab_depth(beam_scale, slab, receiver.texel, expected), 0.0, 1.0);
     return clamp(shadow_reconstruct(numbers, depth), 0.0, 1.0);
 }

@@ -1,7 +1,7 @@
 use super::Width;
 use super::statistic::{Channels, MAX_CHANNELS, Statistic};
 use crate::error::{Error, check};
-use crate::plan::{Receiver, ShadowMap};
+use crate::plan::{Receiver, ShadowMap, Slab};
 use glam::DVec2;
 
 /// Numbers in place of depths, filtered by a Gaussian.
@@ -289,14 +289,18 @@ impl Prefilter {
         // Edge-on to the light the slope has no end: 8 in a texel is as good as infinite where all of depth is 1.
         let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
         let steepest = 8.0 * texels;
-        let slope = receiver.slope.clamp(-steepest, steepest);
-        let slope = map.slab_slope(receiver.st, expected, slope) / texels;
+        // Over the slab's own planes.
+        let lean = match map.slab {
+            Slab::Leaning { slope, .. } => slope,
+            Slab::Distances { .. } => DVec2::ZERO,
+        };
+        let slope = (receiver.slope.clamp(-steepest, steepest) - lean) / texels;
         let [ss, tt, st] = footprint.covariance;
         let variance =
             ss * slope.x * slope.x + tt * slope.y * slope.y + 2.0 * st * slope.x * slope.y;
         let plane = f64::from(self.statistic.plane_deviations()) * variance.max(0.0).sqrt();
         // What is stored lies between 0 and 1, and periods end there.
-        let depth = (map.slab_depth(receiver.st, expected) - plane).clamp(0.0, 1.0);
+        let depth = map.slab_depth(receiver.st, expected - plane).clamp(0.0, 1.0);
         self.statistic.visibility(channels, depth as f32)
     }
 }

@@ -34,8 +34,7 @@ fn filters() -> impl Iterator<Item = Filter> {
         Statistic::Csm(Csm::new(3, 0.0, false, true).unwrap()),
     ];
     let prefiltered = statistics.into_iter().enumerate().map(|(i, statistic)| {
-        let blurs = [Blur::Texels(5), Blur::Width(Width::Metres(1e6)), Blur::Texels(1)];
-        let (blur, half) = (blurs[i % 3], i % 2 == 1);
+        let (blur, half) = (Blur::Texels([3, 1][i % 2]), i % 3 == 1);
         Filter::Prefiltered(Prefilter { statistic, blur, half })
     });
     comparing().chain(prefiltered)
@@ -147,6 +146,24 @@ proptest! {
                 prop_assert!((0.0..=1.0).contains(&v), "{v}");
             }
         }
+    }
+}
+
+#[test]
+fn no_width_makes_a_nan() {
+    let statistic = statistic::Statistic::Vsm(statistic::Vsm::default());
+    let blur = Blur::Width(Width::Metres(1.0));
+    let filter = Filter::Prefiltered(Prefilter { statistic, blur, half: true });
+    for texel_metric in [
+        [0.0; 3],
+        [1e300, 1e300, 0.0],
+        [1e300, 1e-300, 1.0],
+        [f64::NAN, 1.0, 0.0],
+        [1.0, f64::INFINITY, f64::NEG_INFINITY],
+    ] {
+        let receiver = Receiver { texel_metric, ..flat(0.5, 0.5, 0.5) };
+        let v = visibility(&map([3, 3], Rows::Even), filter, &receiver, |_, _| 0.4);
+        assert!((0.0..=1.0).contains(&v), "{texel_metric:?}: {v}");
     }
 }
 
