@@ -83,9 +83,10 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     statistics.iter().map(of).collect()
 }
 
+/// As `csmM`, or as `csmM(offset,leak=0.15)`.
 fn csm(order: u32, is_offset: bool) -> Statistic {
     let csm = Csm::new(order, 0.0, is_offset, !is_offset).unwrap();
-    Statistic::Csm(csm.with_leak(0.1))
+    Statistic::Csm(csm.with_leak(if is_offset { 0.15 } else { 0.1 }))
 }
 
 /// Under bars finer than the blur every point is half lit, and what leaks comes on top of that. The series is not doubled, which would brighten it.
@@ -115,9 +116,9 @@ fn a_lattice_leaks_a_tenth_of_what_variance_does() {
     assert!(dark[0] > 0.01, "nothing leaks: {dark:?}");
     assert!(dark[1] < 0.1 * dark[0] && dark[2] < 0.1 * dark[0], "{dark:?}");
 
-    // Rows of fences have no such place. Eight terms leak a ninth there.
+    // Rows of fences have no such place.
     let statistics = [Statistic::Vsm(Vsm::default()), csm(8, true), csm(16, true)];
     let rows = leaks(&load("lattice/fence_rows.glb"), &statistics);
     let rows: Vec<f64> = rows.into_iter().map(|[all, _]| all).collect();
-    assert!(rows[1] < 0.125 * rows[0] && rows[2] < 0.125 * rows[0], "{rows:?}");
+    assert!(rows[1] < 0.1 * rows[0] && rows[2] < 0.1 * rows[0], "{rows:?}");
 }
