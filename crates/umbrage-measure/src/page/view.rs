@@ -36,6 +36,7 @@ pub(super) struct Html<'a> {
     counted: String,
     undefined: bool,
     flicker: bool,
+    noise: bool,
     setup: Vec<(&'static str, String)>,
     techniques: Vec<(String, &'static str)>,
     notices: &'a [String],
@@ -141,6 +142,7 @@ impl<'a> Html<'a> {
             counted: counted(report),
             undefined: report.results.iter().any(|r| r.error_px.undefined > 0),
             flicker: report.results.iter().any(|r| r.flicker.is_some()),
+            noise: report.results.iter().any(|r| r.noise.is_some()),
             setup: setup(report),
             techniques: techniques(report.results.iter().map(|r| r.shadows.as_str())),
             notices,
@@ -423,15 +425,21 @@ mod tests {
                 command: None,
             };
             let html = Html::new(&page).unwrap().render().unwrap();
-            ["<dt>Motion</dt><dd>orbit, 6 frames</dd>", "<dt>Flicker</dt><dd>The mean change"]
-                .map(|text| html.contains(text))
+            [
+                "<dt>Motion</dt><dd>orbit, 6 frames</dd>",
+                "<dt>Flicker</dt><dd>The mean change",
+                "<dt>Noise</dt><dd>How much a pixel",
+            ]
+            .map(|text| html.contains(text))
         };
-        assert_eq!(shows(&report), [false, false]);
+        assert_eq!(shows(&report), [false; 3]);
         report.motion = Some(crate::Motion { kind: "orbit".to_owned(), frames: 6 });
         // Nothing that both frames show need face the light.
-        assert_eq!(shows(&report), [true, false]);
+        assert_eq!(shows(&report), [true, false, false]);
         report.results[1].flicker = Some(0.0);
-        assert_eq!(shows(&report), [true, true]);
+        assert_eq!(shows(&report), [true, true, false]);
+        report.results[1].noise = Some(0.0);
+        assert_eq!(shows(&report), [true; 3]);
     }
 
     #[test]
