@@ -167,11 +167,7 @@ impl<'a> Planned<'a> {
     ) -> Self {
         let filter = technique.filter;
         let max_side = technique.options.max_side;
-        let slot = |m: &ShadowMap| match m.resolution {
-            empty if m.is_empty() => empty,
-            full => filter.slot_texels(full),
-        };
-        let slots: Vec<_> = plan.maps.iter().map(slot).collect();
+        let slots: Vec<_> = plan.maps.iter().map(|m| filter.slot_texels(m.resolution)).collect();
         let [atlas, layers] = [Atlas::packed_sizes, Atlas::layered_sizes].map(|lay_out| {
             let atlas = lay_out(&slots, filter.reach_texels(), max_side);
             atlas.inspect_err(|e| log::info!("no atlas: {e}")).ok()

@@ -5,6 +5,7 @@ mod partition;
 
 use anyhow::{Error, Result, anyhow, bail, ensure};
 pub(crate) use filter::Filter;
+use filter::LightSize;
 use partition::{Part, Slices};
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -101,14 +102,12 @@ impl Technique {
 
     /// That the filter's light is of the kind that shines.
     pub(crate) fn check_light(&self, light: &Light) -> Result<()> {
-        let Some(Filter::Pcss(_)) = &self.spec.filter else { return Ok(()) };
-        let is_sun = matches!(light, Light::Directional { .. });
-        let is_of_sun = self.spec.filter.as_ref().is_some_and(Filter::is_under_sun);
-        match (is_sun, is_of_sun) {
-            (true, false) => {
+        let size = self.spec.filter.as_ref().and_then(Filter::light_size);
+        match (light, size) {
+            (Light::Directional { .. }, Some(LightSize::Metres(_))) => {
                 bail!("--shadows {}: a sun's size is an angle, as in light=0.53deg", self.spec)
             }
-            (false, true) => {
+            (Light::Spot(_) | Light::Point(_), Some(LightSize::Degrees(_))) => {
                 bail!("--shadows {}: a lamp's size is a length, as in light=0.2m", self.spec)
             }
             _ => Ok(()),

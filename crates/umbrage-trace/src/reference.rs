@@ -3,7 +3,9 @@ use crate::{Error, Progress, Ray, Sample, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use umbrage::visibility::statistic::Channels;
-use umbrage::visibility::{Filter, Prefilter, Texels, texel_coordinates, visibility};
+use umbrage::visibility::{
+    Filter, Prefilter, Texels, shadow_coordinates, texel_coordinates, visibility,
+};
 use umbrage::{Plan, ShadowMap};
 
 /// A shadow map's depths, each found by a ray through its texel's centre.
@@ -105,9 +107,7 @@ fn bytes_per_texel(filter: Filter) -> u32 {
 
 /// Depth of the first hit along the beam through a point in texel coordinates.
 fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
-    let [width, height] = map.resolution.map(f64::from);
-    let st = DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height));
-    let beam = map.beam(st)?;
+    let beam = map.beam(shadow_coordinates(map, texel))?;
     let ray = Ray { origin: beam.origin, direction: beam.direction };
     let hit = tracer.closest(ray, [-beam.reach_back, f64::INFINITY])?;
     let depth = map.project(tracer.position(&hit)).map_or(1.0, |p| p.z);

@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{ground, nobody, scene, sheet};
+use common::{ground, nobody, plan, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, Width};
-use umbrage::{Bounds, Camera, Light, LookAt, Options, Planner, PointLight, Size, SpotLight, Warp};
+use umbrage::{Camera, Light, LookAt, Options, PointLight, Size, SpotLight, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
 #[test]
@@ -62,10 +62,8 @@ fn lamps_are_filtered_as_well_as_compared() {
                     keeps_casters: matches!(filter, Filter::Pcss { .. }),
                     ..Options::default()
                 };
-                let bounds = Bounds::of_scene(scene.bounds());
-                let mut planner = Planner::new();
-                let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
-                let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
+                let plan = plan(&scene, &camera, light, &options);
+                let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
                 let visibility = band.map(|s| reference.visibility(0, s), &nobody);
                 let pairs = truth.iter().zip(visibility);
                 let off = pairs.filter(|(t, v)| t.is_some_and(|t| (t - v).abs() > 0.5)).count();

@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{ground, nobody, scene, sheet};
+use common::{ground, nobody, plan, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::visibility::statistic::{Csm, Statistic};
 use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
-use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Partition, Planner, Size, Warp};
+use umbrage::{Camera, Light, LookAt, Objective, Options, Partition, Size, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
 /// Light that falls a little sideways onto the ground, past the straight edge of a sheet 3 m above it.
@@ -42,10 +42,8 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
         keeps_casters: matches!(filter, Filter::Pcss { .. }),
         ..Options::default()
     };
-    let bounds = Bounds::of_scene(scene.bounds());
-    let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
-    let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
+    let plan = plan(&scene, &camera, light, &options);
+    let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let lit = |x: f64, z: f64| {
         let pixel = camera.pixel(DVec3::new(x, 0.0, z)).unwrap();

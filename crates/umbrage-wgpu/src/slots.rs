@@ -95,15 +95,14 @@ impl Slots {
         let max_side = support.max_side;
         let gutter = filter.reach_texels();
         // What is drawn for a map has sides that are multiples of something, and with them where maps begin.
-        let aligned = |size: [u32; 2]| filter.slot_texels(size);
         let roomy = |n: u32| {
             let most = max_side.saturating_sub(2 * gutter).max(n);
             (n + n.div_ceil(ROOM)).min(most)
         };
         let slot = |size: [u32; 2]| match size {
             size if size.contains(&0) => size,
-            size if with_room => aligned(size.map(roomy)),
-            size => aligned(size),
+            size if with_room => filter.slot_texels(size.map(roomy)),
+            size => filter.slot_texels(size),
         };
         let slots: Vec<[u32; 2]> = self.sizes.iter().copied().map(slot).collect();
         let fits = layout == Layout::Atlas || slots.len() <= support.max_layers as usize;

@@ -192,7 +192,7 @@ fn statistic(statistic: &Statistic) -> String {
         _ => String::new(),
     };
     let textures = textures(statistic).to_string();
-    [include_str!("wgsl/linear.wgsl"), chebyshev, &own.replace("{TEXTURES}", &textures), ""]
+    [include_str!("wgsl/slab.wgsl"), chebyshev, &own.replace("{TEXTURES}", &textures), ""]
         .join("\n")
 }
 

@@ -130,15 +130,14 @@ fn least_squares(points: &[DVec3]) -> (DVec2, f64) {
         covariance += DMat2::from_cols(st * st.x, st * st.y);
         with_depth += st * d.z;
     }
-    let [covariance, with_depth] =
-        [covariance * n.recip(), DMat2::from_cols(with_depth / n, DVec2::ZERO)];
+    let (covariance, with_depth) = (covariance * n.recip(), with_depth / n);
     let half_difference = 0.5 * (covariance.x_axis.x - covariance.y_axis.y);
     let least = 0.5 * (covariance.x_axis.x + covariance.y_axis.y)
         - half_difference.hypot(covariance.x_axis.y);
     if least.is_nan() || least < 1e-6 {
         return (DVec2::ZERO, STEEPEST);
     }
-    let slope = covariance.inverse() * with_depth.x_axis;
+    let slope = covariance.inverse() * with_depth;
     let [near, far] = extremes(points, slope);
     // Tilted by so much, a slab is thicker by the points' width in that direction, which is two deviations at least, than twice what it was.
     (slope, ((far.0 - near.0) / least.sqrt()).min(STEEPEST))

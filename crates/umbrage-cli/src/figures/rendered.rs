@@ -31,8 +31,7 @@ impl<'a> Shot<'a> {
         light: Light,
         look: impl FnOnce(&mut LookAt),
     ) -> Result<Self> {
-        let v = scene.default_view();
-        let mut view = v.look_at(TILE);
+        let mut view = scene.default_view().look_at(TILE);
         look(&mut view);
         let camera = Camera::look_at(view)?;
         Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })

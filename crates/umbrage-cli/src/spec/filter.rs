@@ -161,14 +161,14 @@ const DEFAULT_SAMPLES: u32 = 6;
 const FILTERS: &[&str] = &["hard", "pcf", "vsm", "esm", "evsm", "evsm2", "msm", "csm", "pcss"];
 
 impl Filter {
-    /// Whether the light's size, if it has one, is a sun's: an angle, as is the default.
-    pub(super) fn is_under_sun(&self) -> bool {
-        match self {
-            Self::Pcss(options) => {
-                !options.iter().any(|o| matches!(o, FilterOption::Light(LightSize::Metres(_))))
-            }
-            _ => true,
-        }
+    /// How large the light is, for those that ask.
+    pub(super) fn light_size(&self) -> Option<LightSize> {
+        let Self::Pcss(options) = self else { return None };
+        let told = options.iter().find_map(|o| match o {
+            FilterOption::Light(size) => Some(*size),
+            _ => None,
+        });
+        Some(told.unwrap_or_default())
     }
 
     /// What executes it, or why this version cannot.
@@ -198,15 +198,11 @@ impl Filter {
                 return Ok(filter);
             }
             Self::Pcss(options) => {
-                let source = options.iter().find_map(|o| match o {
-                    FilterOption::Light(source) => Some(source.diameter()),
-                    _ => None,
-                });
                 let n = options.iter().find_map(|o| match o {
                     FilterOption::Samples(n) => Some(*n),
                     _ => None,
                 });
-                let source = source.unwrap_or_else(|| LightSize::default().diameter());
+                let source = self.light_size().unwrap_or_default().diameter();
                 let filter = visibility::Filter::Pcss { n: n.unwrap_or(DEFAULT_SAMPLES), source };
                 filter.check().map_err(|e| anyhow!("`{self}`: {e}"))?;
                 return Ok(filter);

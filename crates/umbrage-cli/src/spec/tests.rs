@@ -1,4 +1,4 @@
-use super::filter::{BlurWidth, BlurredKind, FilterOption, LightSize};
+use super::filter::{BlurWidth, BlurredKind, FilterOption};
 use super::partition::SliceOption;
 use super::*;
 use proptest::prelude::*;

@@ -2,7 +2,9 @@
 #![allow(dead_code, reason = "each test binary uses its share")]
 
 use glam::{DAffine3, DMat4, DVec2, DVec3, Vec2, Vec3, Vec4};
-use umbrage::{Camera, LookAt, MapError, Part, Rows, ShadowMap};
+use umbrage::{
+    Bounds, Camera, Light, LookAt, MapError, Options, Part, Plan, Planner, Rows, ShadowMap,
+};
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene};
 use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer};
 
@@ -220,4 +222,10 @@ impl Random {
     pub(crate) fn in_square(&mut self, half: f64) -> DVec2 {
         DVec2::new(self.between(-half, half), self.between(-half, half))
     }
+}
+
+/// Plans one light's maps for all of a scene.
+pub(crate) fn plan(scene: &Scene, camera: &Camera, light: Light, options: &Options) -> Plan {
+    let bounds = Bounds::of_scene(scene.bounds());
+    Planner::new().plan(camera, &[light], &bounds, options).unwrap().clone()
 }

@@ -187,8 +187,11 @@ impl Filter {
     }
 
     /// Sides of what a map takes in an atlas, between gutters of [`reach_texels`](Self::reach_texels): its resolution, and what that is rounded up to
-    /// ([`drawn_texels`](Self::drawn_texels)). In an atlas of such rectangles maps begin where smaller copies ask for it.
+    /// ([`drawn_texels`](Self::drawn_texels)). In an atlas of such rectangles maps begin where smaller copies ask for it. Empty maps take nothing.
     pub fn slot_texels(self, resolution: [u32; 2]) -> [u32; 2] {
+        if resolution.contains(&0) {
+            return resolution;
+        }
         let gutters = 2 * self.reach_texels();
         self.drawn_texels(resolution).map(|n| n - gutters)
     }
@@ -246,6 +249,12 @@ pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
     DVec2::new(st.x * width, map.rows.row_from_t(st.y) * height)
 }
 
+/// The shadow coordinates of a place in the map's texels: the inverse of [`texel_coordinates`].
+pub fn shadow_coordinates(map: &ShadowMap, texel: DVec2) -> DVec2 {
+    let [width, height] = map.resolution.map(f64::from);
+    DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height))
+}
+
 /// How much of the light reaches `receiver`, from 0 to 1, by `map`'s texels: a function from (i, j) to depth, also of those up to
 /// [`Filter::reach_texels`] outside the map, or what holds more than depths. Receivers outside the map, or before its
 /// depths, are lit.
@@ -266,6 +275,15 @@ pub fn visibility(
     let texel = texel_coordinates(map, st);
     let test = Test::new(map, receiver);
     let is_lit = |i, j| f64::from(texels.depth(i, j)) >= test.nearest_lit(i, j);
+    // Of the texels around, those that a pattern over a width falls on.
+    let spread = |metric, pattern, n| {
+        let ends = drawn(map, filter);
+        offsets(metric, pattern, n).map(move |offset| nearest(texel + offset, ends))
+    };
+    let lit_share = |metric, pattern, n| {
+        let lit = spread(metric, pattern, n).filter(|&[i, j]| is_lit(i, j)).count();
+        (lit as f64 / f64::from(n * n)) as f32
+    };
     match filter {
         Filter::Hard => {
             let last = |n: u32| f64::from(n - 1);
@@ -282,24 +300,15 @@ pub fn visibility(
         }
         Filter::Spread { n, width, pattern } => {
             let max = if pattern == Pattern::Grid { Filter::MAX_PCF } else { Filter::MAX_DISC };
-            let n = n.clamp(1, max);
-            let place = |offset| nearest(texel + offset, drawn(map, filter));
-            let mut lit = 0;
-            for offset in offsets(width.metric(receiver), pattern, n) {
-                let [i, j] = place(offset);
-                lit += u32::from(is_lit(i, j));
-            }
-            (f64::from(lit) / f64::from(n * n)) as f32
+            lit_share(width.metric(receiver), pattern, n.clamp(1, max))
         }
         Filter::Pcss { n, source } => {
             let n = n.clamp(1, Filter::MAX_DISC);
             let across = |width: f64| receiver.texel_metric.map(|m| m * width * width);
-            let place = |offset| nearest(texel + offset, drawn(map, filter));
             let penumbra = |st, depth| f64::from(source) * map.penumbra(receiver, st, depth);
             // What hides some of the light lies between here and it, where the map's depths begin at the latest.
             let (mut widths, mut hidden) = (0.0, 0u32);
-            for offset in offsets(across(penumbra(st, 0.0)), Pattern::Poisson, n) {
-                let [i, j] = place(offset);
+            for [i, j] in spread(across(penumbra(st, 0.0)), Pattern::Poisson, n) {
                 if !is_lit(i, j) {
                     widths += penumbra(test.center(i, j), f64::from(texels.depth(i, j)));
                     hidden += 1;
@@ -308,12 +317,7 @@ pub fn visibility(
             if hidden == 0 {
                 return 1.0;
             }
-            let mut lit = 0;
-            for offset in offsets(across(widths / f64::from(hidden)), Pattern::Poisson, n) {
-                let [i, j] = place(offset);
-                lit += u32::from(is_lit(i, j));
-            }
-            (f64::from(lit) / f64::from(n * n)) as f32
+            lit_share(across(widths / f64::from(hidden)), Pattern::Poisson, n)
         }
         Filter::Prefiltered(prefilter) => {
             let [low, high] = drawn(map, filter);
@@ -365,9 +369,7 @@ impl<'a> Test<'a> {
 
     /// The middle of texel (i, j), (s, t).
     fn center(&self, i: i32, j: i32) -> DVec2 {
-        let [width, height] = self.map.resolution.map(f64::from);
-        let t = self.map.rows.t_from_row((f64::from(j) + 0.5) / height);
-        DVec2::new((f64::from(i) + 0.5) / width, t)
+        shadow_coordinates(self.map, DVec2::new(f64::from(i), f64::from(j)) + 0.5)
     }
 
     /// The depth from which on texel (i, j) does not hide the receiver.

@@ -1,5 +1,5 @@
-use super::Width;
 use super::statistic::{Channels, MAX_CHANNELS, Statistic};
+use super::{Width, shadow_coordinates};
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap, Slab};
 use glam::DVec2;
@@ -37,11 +37,12 @@ pub struct Footprint {
     pub covariance: [f64; 3],
 }
 
-/// Places along one axis of a Gaussian of standard deviation 1, `n` of them from end to end of ±2: where, and how heavy.
+/// `n` places along one axis of a Gaussian, from end to end of ±2 deviations: how many steps from the middle, and how heavy.
 fn places(n: u32) -> impl Iterator<Item = (f64, f64)> + Clone {
+    let (middle, deviation) = (0.5 * (f64::from(n) - 1.0), f64::from(n) / 4.0);
     (0..n).map(move |i| {
-        let at = (f64::from(i) + 0.5) / f64::from(n) * 4.0 - 2.0;
-        (at, (-0.5 * at * at).exp())
+        let steps = f64::from(i) - middle;
+        (steps, (-0.5 * (steps / deviation).powi(2)).exp())
     })
 }
 
@@ -85,12 +86,10 @@ impl Footprint {
         let mut sum = [0.0; MAX_CHANNELS];
         let mut weights = 0.0;
         let [along, across] = self.samples;
-        let middle = self.samples.map(|n| 0.5 * (f64::from(n) - 1.0));
-        for (j, (_, v)) in (0..across).zip(places(across)) {
-            for (i, (_, u)) in (0..along).zip(places(along)) {
-                let offset = self.steps[0] * (f64::from(i) - middle[0])
-                    + self.steps[1] * (f64::from(j) - middle[1]);
-                let weight = (u * v) as f32;
+        for (v, weight_across) in places(across) {
+            for (u, weight_along) in places(along) {
+                let offset = self.steps[0] * u + self.steps[1] * v;
+                let weight = (weight_along * weight_across) as f32;
                 weights += weight;
                 let here = sample((texel + offset).clamp(low, high.max(low)), self.level);
                 sum.iter_mut().zip(here).for_each(|(s, h)| *s += weight * h);
@@ -230,9 +229,7 @@ impl Prefilter {
 
     /// The numbers of one texel of this depth, before they are stored.
     pub fn encode(&self, map: &ShadowMap, i: i32, j: i32, depth: f32) -> Channels {
-        let [width, height] = map.resolution.map(f64::from);
-        let t = map.rows.t_from_row((f64::from(j) + 0.5) / height);
-        let st = DVec2::new((f64::from(i) + 0.5) / width, t);
+        let st = shadow_coordinates(map, DVec2::new(f64::from(i), f64::from(j)) + 0.5);
         self.statistic.encode(map.slab_depth(st, f64::from(depth)).clamp(0.0, 1.0) as f32)
     }
 
