@@ -5,7 +5,7 @@ pub(crate) mod theory;
 
 use crate::figures;
 use crate::motion::Motion;
-use crate::spec::Technique;
+use crate::spec::Spec;
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::builder::PossibleValuesParser;
@@ -21,11 +21,13 @@ use std::path::PathBuf;
 #[command(
     name = "umbrage",
     version,
+    disable_help_subcommand = true,
     after_help = "\
 Examples:
   umbrage
   umbrage compare town -o report --shadows uniform --shadows lispsm:pcf3@2048
-  umbrage COMMAND --help"
+  umbrage COMMAND --help
+  umbrage help shadows"
 )]
 pub(crate) struct Cli {
     /// Log what happens to standard error; twice for more.
@@ -57,7 +59,24 @@ pub(crate) enum Command {
     Bench(bench::Bench),
     /// List the GPUs there are, and what they can do.
     Devices(bench::Devices),
+    /// Explain a command, or how techniques are written: `umbrage help shadows`.
+    Help(Help),
 }
+
+/// `umbrage help`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage help shadows
+  umbrage help theory step")]
+pub(crate) struct Help {
+    /// `shadows`, or a command's words.
+    #[arg(value_name = "TOPIC")]
+    pub(crate) topic: Vec<OsString>,
+}
+
+/// The topic of `umbrage help` that is no command: the language of techniques.
+const LANGUAGE: &str = "shadows";
 
 /// `umbrage render`.
 #[derive(Debug, Args)]
@@ -72,9 +91,9 @@ pub(crate) struct Render {
     /// Picture to write: .png, or .exr for raw floats.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-    /// How to make shadows, as in lispsm:pcf3@2048.
-    #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
-    pub(crate) shadows: Technique,
+    /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
+    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    pub(crate) shadows: Spec,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
     /// What to write.
@@ -222,9 +241,9 @@ pub(crate) struct Plan {
     /// view between --near and --far is served.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: Option<String>,
-    /// How to make shadows, as in lispsm:pcf3@2048.
-    #[arg(long_help = SHADOWS_HELP, long, value_name = "SPEC", default_value = "adaptive")]
-    pub(crate) shadows: Technique,
+    /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
+    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    pub(crate) shadows: Spec,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
     /// What the maps are fitted to, and their errors the largest over.
@@ -281,12 +300,10 @@ pub(crate) struct SceneArgs {
 /// Techniques that compete.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct TechniqueArgs {
-    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique.
-    #[arg(long_help = SHADOWS_HELP,
-        long, value_name = "SPEC",
-        default_values = DEFAULT_TECHNIQUES
-    )]
-    pub(crate) shadows: Vec<Technique>,
+    /// How to make shadows, as in lispsm:pcf3@2048; once for each technique (`umbrage help shadows`
+    /// has all words).
+    #[arg(long, value_name = "SPEC", default_values = DEFAULT_TECHNIQUES)]
+    pub(crate) shadows: Vec<Spec>,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
     /// What the maps are fitted to.
@@ -424,29 +441,6 @@ const DEFAULT_SIZE: &str = "960x540";
 /// What `compare` compares if not told.
 pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "tsm", "adaptive"];
 
-/// The shadow specification language, as far as this version can execute it.
-const SHADOWS_HELP: &str = "\
-How to make shadows: WARP[+zK][+face][:FILTER][@TEXELS], as in
-lispsm+z4:pcf3@2048.
-WARP:   unfocused, uniform, uniform(stable), psm, lispsm, tsm,
-        tsm(focus=METRES), adaptive, adaptive(area), log, lambda=METRES.
-+zK:    1 to 16 slices along the view with a map each, self-similar unless
-        told: +z4(fitted), +z4(practical=0.5), +z4(at=5/20/60) metres.
-        +z4(overlap=0.1) fades from each to the next over a tenth of its
-        length; +z4(fitted,overlap=0.1) does both.
-+face:  maps for the four sides of the view and its near face;
-        +face(sides) without the near face.
-FILTER: hard (default); pcfN for the mean over N×N texels; vsm, esm, evsm,
-        evsm2, msm, csmM (M = 1 to 16) with (blur=7) texels, (half) as
-        many of them each way. (blur=2px) and (blur=0.3m) are as wide near
-        as far, for pcfN too, which with them takes poisson.
-        leak=L (not esm) takes what is darker for shadow; exponent=C is for
-        esm and evsm; csmM takes attenuation=A, offset, scale and bits=16.
-        pcss for soft shadows: (light=0.53deg) or (light=0.2m), (samples=6).
-TEXELS: a budget of TEXELS² texels for all maps, shared among them and
-        between s and t as the view needs it (default 1024), or WxH for
-        exactly these in every map.";
-
 /// What is done if no command is given.
 const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
 
@@ -462,17 +456,31 @@ pub(crate) fn parse(
         let main_job = MAIN_JOB.map(OsString::from);
         return parse(main_job).map(|(command, _)| (command, verbose));
     };
+    if let Command::Help(help) = &command
+        && !help.is_language()
+    {
+        // A command's own help, or its complaint about words that are none.
+        let topic = help.topic.iter().cloned();
+        let words = ["umbrage".into()].into_iter().chain(topic).chain(["--help".into()]);
+        return parse(words.collect::<Vec<OsString>>());
+    }
     let checked = match &mut command {
         Command::Render(render) => render.check(),
         Command::Compare(compare) => compare.check(),
         Command::Sweep(sweep) => sweep.comparison.techniques.check(),
         Command::Plan(plan) => plan.check(),
-        Command::Scenes(_) | Command::Figures(_) | Command::Devices(_) => Ok(()),
+        Command::Scenes(_) | Command::Figures(_) | Command::Devices(_) | Command::Help(_) => Ok(()),
         Command::Bench(bench) => bench.check(),
         Command::Theory(theory) => theory.check(),
     };
     checked.map_err(|e| clap::Error::raw(clap::error::ErrorKind::ValueValidation, e))?;
     Ok((command, verbose))
+}
+
+impl Help {
+    fn is_language(&self) -> bool {
+        self.topic == [LANGUAGE]
+    }
 }
 
 /// Clap's message on one line, without usage and pointers to `--help`.
@@ -522,10 +530,10 @@ impl Compare {
 }
 
 /// That no technique is given twice.
-fn check_distinct(techniques: &[Technique]) -> Result<()> {
-    for (i, technique) in techniques.iter().enumerate() {
-        let is_new = !techniques[..i].contains(technique);
-        ensure!(is_new, "--shadows: `{}` is given twice", technique.spec);
+fn check_distinct(techniques: &[Spec]) -> Result<()> {
+    for (i, spec) in techniques.iter().enumerate() {
+        let is_new = !techniques[..i].contains(spec);
+        ensure!(is_new, "--shadows: `{}` is given twice", spec);
     }
     Ok(())
 }
@@ -560,18 +568,18 @@ impl Plan {
 
 impl TexelArgs {
     /// Gives the error to the techniques that do not say how many texels they have.
-    fn apply(self, techniques: &mut [Technique]) -> Result<()> {
+    fn apply(self, techniques: &mut [Spec]) -> Result<()> {
         let Some(pixels) = self.max_error else { return Ok(()) };
-        if let Some(told) = techniques.iter().find(|t| t.spec.size.is_some())
-            && techniques.iter().all(|t| t.spec.size.is_some())
+        if let Some(told) = techniques.iter().find(|t| t.is_sized())
+            && techniques.iter().all(|t| t.is_sized())
         {
             bail!(
                 "--max-error: `{}` says how many texels there are; leave out either of them",
-                told.spec
+                told
             );
         }
-        for technique in techniques {
-            technique.limit_error(pixels);
+        for spec in techniques {
+            spec.limit_error(pixels);
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::output::{aligned, print};
 use crate::pixels::{casters, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
-use crate::spec::Technique;
+use crate::spec::{Spec, planner};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -95,7 +95,7 @@ impl Spread {
 
 /// A technique at work.
 struct Contender<'a> {
-    technique: &'a Technique,
+    spec: &'a Spec,
     bencher: Bencher<'a>,
     planner: Planner,
     frames: Vec<Frame>,
@@ -124,28 +124,22 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let frames = WARM_UP + args.frames;
     let progress = Progress::new(u64::from(frames) * args.techniques.shadows.len() as u64, quiet);
     let mut contenders = Vec::new();
-    for technique in &args.techniques.shadows {
-        technique.check_light(&lamp.light)?;
-        let bencher = sets.bencher(technique, camera.image())?;
-        contenders.push(Contender {
-            technique,
-            bencher,
-            planner: Planner::new(),
-            frames: Vec::new(),
-        });
+    for spec in &args.techniques.shadows {
+        let bencher = sets.bencher(spec, camera.image())?;
+        contenders.push(Contender { spec, bencher, planner: planner(), frames: Vec::new() });
     }
     for index in 0..frames {
         // Whoever comes first in a frame does not always do so.
         let first = index as usize % contenders.len();
         contenders.rotate_left(first);
         for contender in &mut contenders {
-            let technique = contender.technique;
-            progress.stage(technique.spec.to_string());
+            let spec = contender.spec;
+            progress.stage(spec.to_string());
             let start = Instant::now();
             let plan = contender
                 .planner
-                .plan(&camera, &[lamp.light], &bounds, &technique.options)
-                .map_err(|e| technique.error(&e))?;
+                .plan(&camera, &[lamp.light], &bounds, spec.technique())
+                .map_err(|e| spec.error(&e))?;
             let planned = milliseconds(start);
             let costs = contender.bencher.frame(&view, plan, args.still)?;
             contender.frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
@@ -157,11 +151,11 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
 
     let mut results = Vec::new();
     for contender in &mut contenders {
-        let technique = contender.technique;
+        let spec = contender.spec;
         let plan = contender
             .planner
-            .plan(&camera, &[lamp.light], &bounds, &technique.options)
-            .map_err(|e| technique.error(&e))?;
+            .plan(&camera, &[lamp.light], &bounds, spec.technique())
+            .map_err(|e| spec.error(&e))?;
         let first = contender.frames.first().context("frames")?;
         let counted = &contender.frames[WARM_UP as usize..];
         let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
@@ -184,7 +178,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             }
         }
         results.push(ResultJson {
-            shadows: technique.spec.to_string(),
+            shadows: spec.to_string(),
             backend: contender.bencher.executor().name(),
             device: execution.device().filter(|_| contender.bencher.executor().is_gpu()),
             gpu_timestamps: contender.bencher.has_timestamps(),

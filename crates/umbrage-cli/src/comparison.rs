@@ -6,7 +6,7 @@ use crate::motion::{Motion, Scenery, flicker, noise};
 use crate::pixels::{self, Rows, Shadowed, Texels, casters, casters_culled, milliseconds};
 use crate::progress::Progress;
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker};
-use crate::spec::Technique;
+use crate::spec::Spec;
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 use std::path::Path;
@@ -50,7 +50,7 @@ pub(crate) struct Compared<'a> {
 
 /// A technique at work: its maps, and the picture so far.
 struct Contender<'a> {
-    technique: &'a Technique,
+    spec: &'a Spec,
     plan: &'a Plan,
     executor: Executor<'a>,
     flicker: Option<f64>,
@@ -136,14 +136,14 @@ impl<'a> Comparison<'a> {
     /// Renders the maps, and traces the truth and every technique's picture.
     pub(crate) fn trace(&self, progress: &Progress) -> Result<Compared<'_>> {
         let mut contenders = Vec::new();
-        for (technique, (plan, ms)) in self.options.techniques.shadows.iter().zip(&self.plans) {
-            progress.stage(format!("{}: shadow map", technique.spec));
-            let mut executor = self.stage.sets.executor(technique)?;
+        for (spec, (plan, ms)) in self.options.techniques.shadows.iter().zip(&self.plans) {
+            progress.stage(format!("{}: shadow map", spec));
+            let mut executor = self.stage.sets.executor(spec)?;
             let start = Instant::now();
             let filter = executor.render(plan, &|rows| progress.advance(rows))?;
             let depth = milliseconds(start) - filter.unwrap_or(0.0);
             contenders.push(Contender {
-                technique,
+                spec,
                 plan,
                 executor,
                 flicker: None,
@@ -255,7 +255,7 @@ fn trace(
         truth.counted.extend(strip.counted());
         truth.shadowed.push(&strip);
         for contender in contenders.iter_mut() {
-            progress.stage(format!("{}: picture", contender.technique.spec));
+            progress.stage(format!("{}: picture", contender.spec));
             let start = Instant::now();
             let strip = contender.executor.strip(&rows)?;
             *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
@@ -286,7 +286,7 @@ impl Contender<'_> {
         } else {
             None
         };
-        let shadows = self.technique.spec.to_string();
+        let shadows = self.spec.to_string();
         let seen = Seen {
             color: &picture.color,
             visibility: &picture.visibility,
@@ -298,6 +298,7 @@ impl Contender<'_> {
             write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
         let measured = Measured {
             shadows,
+            technique: Some(self.spec.technique().to_string()),
             backend: self.executor.name().into(),
             device: device.filter(|_| self.executor.is_gpu()),
             maps: self.plan.maps.len() as u32,

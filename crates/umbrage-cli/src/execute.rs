@@ -3,7 +3,7 @@
 use crate::args::{Backend, ExecutionArgs};
 use crate::output::note;
 use crate::pixels::{Rows, Strip, milliseconds};
-use crate::spec::Technique;
+use crate::spec::Spec;
 use anyhow::{Context, Result, anyhow, bail};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -23,15 +23,15 @@ pub(crate) struct Execution {
 
 impl Execution {
     /// Opens what the arguments ask for.
-    pub(crate) fn open(args: &ExecutionArgs, techniques: &[Technique]) -> Result<Self> {
+    pub(crate) fn open(args: &ExecutionArgs, techniques: &[Spec]) -> Result<Self> {
         let log = techniques.iter().find(|t| !runs_on_gpu(t));
         match args.backend {
             Backend::Reference => Ok(Self { gpu: None, choice: None }),
             Backend::Gpu => {
-                if let Some(technique) = log {
+                if let Some(spec) = log {
                     return Err(anyhow!(
                         "--backend: no GPU rasterises the rows of `{}`; take reference or auto",
-                        technique.spec
+                        spec
                     ));
                 }
                 let gpu = Gpu::open().map_err(|e| anyhow!("--backend: {e}; take reference"))?;
@@ -45,7 +45,7 @@ impl Execution {
                 Ok(gpu) => {
                     let software = if gpu.is_software() { ", in software" } else { "" };
                     let log = log.map_or(String::new(), |t| {
-                        format!("; reference for `{}`, which no GPU rasterises", t.spec)
+                        format!("; reference for `{}`, which no GPU rasterises", t)
                     });
                     let choice = format!("gpu, {}{software}{log}", gpu.info().name);
                     Self { gpu: Some(gpu), choice: Some(choice) }
@@ -81,8 +81,8 @@ impl Execution {
 const GPU: &str = "gpu";
 const REFERENCE: &str = "reference";
 
-fn runs_on_gpu(technique: &Technique) -> bool {
-    technique.options.warp != Warp::Log
+fn runs_on_gpu(spec: &Spec) -> bool {
+    spec.technique().warp != Warp::Log
 }
 
 /// A scene where it can be rendered.
@@ -101,19 +101,19 @@ impl<'a> Sets<'a> {
     }
 
     /// Rows that rendering a plan's maps will report.
-    pub(crate) fn rows(&self, plan: &Plan, technique: &Technique) -> u64 {
-        self.gpu_for(technique).map_or_else(|| Reference::rows(plan, technique.filter), |_| 0)
+    pub(crate) fn rows(&self, plan: &Plan, spec: &Spec) -> u64 {
+        self.gpu_for(spec).map_or_else(|| Reference::rows(plan), |_| 0)
     }
 
     /// The GPU, if there is one that can render a technique.
-    fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers<'a>)> {
-        self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
+    fn gpu_for(&self, spec: &Spec) -> Option<&(&'a Gpu, SceneBuffers<'a>)> {
+        self.gpu.as_ref().filter(|_| runs_on_gpu(spec))
     }
 
     /// Who renders a technique.
-    pub(crate) fn executor(&self, technique: &Technique) -> Result<Executor<'_>> {
-        let filter = technique.filter;
-        match self.gpu_for(technique) {
+    pub(crate) fn executor(&self, spec: &Spec) -> Result<Executor<'_>> {
+        let filter = spec.technique().filter;
+        match self.gpu_for(spec) {
             Some((gpu, buffers)) => {
                 let options = ShadowOptions { filter, ..ShadowOptions::default() };
                 let renderer = Renderer::new(gpu, buffers, &options).context("--backend gpu")?;
@@ -121,7 +121,7 @@ impl<'a> Sets<'a> {
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
                 Ok(Executor::Gpu(Box::new(OnGpu { renderer, gpu, timer, plan: None })))
             }
-            None => Ok(Executor::Reference { tracer: &self.tracer, filter, maps: None }),
+            None => Ok(Executor::Reference { tracer: &self.tracer, maps: None }),
         }
     }
 }
@@ -129,7 +129,7 @@ impl<'a> Sets<'a> {
 /// Renders a technique's maps and looks them up.
 pub(crate) enum Executor<'a> {
     Gpu(Box<OnGpu<'a>>),
-    Reference { tracer: &'a Tracer<'a>, filter: Filter, maps: Option<(&'a Plan, Reference<'a>)> },
+    Reference { tracer: &'a Tracer<'a>, maps: Option<(&'a Plan, Reference<'a>)> },
 }
 
 /// A GPU at work.
@@ -168,13 +168,15 @@ impl<'a> Executor<'a> {
         match self {
             Self::Gpu(on) => {
                 let OnGpu { renderer, gpu, timer, plan } = &mut **on;
-                renderer.draw_maps(new, Casters::Still, timer.as_ref()).context("--backend gpu")?;
+                renderer
+                    .draw_maps(new, Casters::Unmoved, timer.as_ref())
+                    .context("--backend gpu")?;
                 gpu.wait()?;
                 *plan = Some(new);
                 Ok(timer.as_ref().map(|t| t.read(gpu)).transpose()?.map(|[_, filter, _]| filter))
             }
-            Self::Reference { tracer, filter, maps } => {
-                *maps = Some((new, Reference::render(tracer, new, *filter, progress)?));
+            Self::Reference { tracer, maps } => {
+                *maps = Some((new, Reference::render(tracer, new, progress)?));
                 Ok(None)
             }
         }
@@ -248,8 +250,8 @@ pub(crate) struct Bencher<'a> {
 
 impl Sets<'_> {
     /// Who draws frames of so many pixels.
-    pub(crate) fn bencher(&self, technique: &Technique, size: [u32; 2]) -> Result<Bencher<'_>> {
-        let executor = self.executor(technique)?;
+    pub(crate) fn bencher(&self, spec: &Spec, size: [u32; 2]) -> Result<Bencher<'_>> {
+        let executor = self.executor(spec)?;
         let target = match &executor {
             Executor::Gpu(on) => {
                 Some((FrameTarget::new(on.gpu, size).context("--size")?, Timer::new(on.gpu)))
@@ -277,7 +279,7 @@ impl Bencher<'_> {
         match (&mut self.executor, &self.target) {
             (Executor::Gpu(on), Some((target, timer))) => {
                 let OnGpu { renderer, gpu, .. } = &mut **on;
-                let casters = if still { Casters::Still } else { Casters::Moved };
+                let casters = if still { Casters::Unmoved } else { Casters::Moved };
                 let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
                 let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
                 let [depth, filter, shade] = match timer {
@@ -302,8 +304,8 @@ impl Bencher<'_> {
                 let bytes = renderer.shadows().lookup_bytes();
                 Ok(Costs { bytes, depth, filter, shade, drawn: Some(drawn) })
             }
-            (Executor::Reference { tracer, filter, .. }, _) => {
-                let reference = Reference::render(tracer, plan, *filter, &|_| {})?;
+            (Executor::Reference { tracer, .. }, _) => {
+                let reference = Reference::render(tracer, plan, &|_| {})?;
                 let depth = milliseconds(start);
                 let shading = Instant::now();
                 for range in view.bands() {

@@ -54,6 +54,7 @@ fn main() -> ExitCode {
         Command::Theory(args) => theory::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Devices(args) => devices::run(args),
+        Command::Help(_) => output::print(&umbrage::language::help()),
     })
 }
 

@@ -3,7 +3,7 @@
 use crate::execute::{Executor, Sets};
 use crate::pixels;
 use crate::progress::Progress;
-use crate::spec::Technique;
+use crate::spec::Spec;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 use glam::{DQuat, DVec3};
@@ -101,7 +101,7 @@ impl<'a> Frame<'a> {
         frames: u32,
         scenery: &Scenery<'a>,
         samples: u32,
-        techniques: &[Technique],
+        techniques: &[Spec],
     ) -> Result<Vec<Self>> {
         let Scenery { sets, bounds, look, light, .. } = *scenery;
         let frame = |i| {
@@ -126,7 +126,7 @@ pub(crate) fn flicker(
     motion: Motion,
     frames: u32,
     scenery: &Scenery<'_>,
-    techniques: &[Technique],
+    techniques: &[Spec],
     progress: &Progress,
 ) -> Result<Vec<Option<f64>>> {
     let Scenery { sets, look, samples, .. } = *scenery;
@@ -174,7 +174,7 @@ pub(crate) fn noise(
     motion: Motion,
     frames: u32,
     scenery: &Scenery<'_>,
-    techniques: &[Technique],
+    techniques: &[Spec],
     progress: &Progress,
 ) -> Result<Vec<Noise>> {
     let Scenery { sets, look, .. } = *scenery;

@@ -1,13 +1,13 @@
 //! From samples to pixels: pictures that grow strip by strip, from the top.
 
-use crate::spec::Technique;
+use crate::spec::{Spec, planner};
 use anyhow::Result;
 use glam::Vec3;
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::ops::Range;
 use std::time::Instant;
-use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, ShadowMap};
+use umbrage::{Aabb, Bounds, Camera, Light, Plan, ShadowMap};
 use umbrage_measure::Rgb;
 use umbrage_scene::Scene;
 use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
@@ -231,18 +231,17 @@ impl Shape {
 
 /// A technique's plan, and how long planning takes, milliseconds, once buffers have grown.
 pub(crate) fn plan(
-    technique: &Technique,
+    spec: &Spec,
     camera: &Camera,
     light: &Light,
     bounds: &Bounds<'_>,
 ) -> Result<(Plan, f64)> {
-    technique.check_light(light)?;
-    let mut planner = Planner::new();
+    let mut planner = planner();
     let mut plan = || {
         let start = Instant::now();
-        let plan = planner.plan(camera, &[*light], bounds, &technique.options);
+        let plan = planner.plan(camera, &[*light], bounds, spec.technique());
         let ms = milliseconds(start);
-        plan.map(|p| (p.clone(), ms)).map_err(|e| technique.error(&e))
+        plan.map(|p| (p.clone(), ms)).map_err(|e| spec.error(&e))
     };
     plan()?;
     plan()

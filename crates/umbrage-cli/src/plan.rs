@@ -4,13 +4,12 @@ use crate::args::{self, Fit};
 use crate::output::print;
 use crate::pixels::{Casters, casters, casters_culled};
 use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
-use crate::spec::Technique;
+use crate::spec::{Spec, planner};
 use anyhow::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
 use umbrage::{
-    Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, Planner, ShadowMap, Size, Slab,
-    Warp,
+    Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, ShadowMap, Size, Slab, Warp,
 };
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -112,7 +111,7 @@ struct LayersJson {
 
 /// A plan, and what follows from it.
 struct Planned<'a> {
-    technique: &'a Technique,
+    spec: &'a Spec,
     onlooker: &'a Onlooker,
     lamps: &'a [Lamp],
     plan: &'a Plan,
@@ -140,13 +139,14 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     });
     let receivers = receivers.transpose()?;
     let bounds = receivers.as_ref().map_or_else(Bounds::default, Receivers::bounds);
-    let technique = &args.shadows;
+    let spec = &args.shadows;
     let lights: Vec<Light> = lamps.iter().map(|l| l.light).collect();
-    let mut planner = Planner::new();
+    let mut planner = planner();
+    let max_side = planner.limits().max_side;
     let plan = planner
-        .plan(&onlooker.camera, &lights, &bounds, &technique.options)
-        .map_err(|e| technique.error(&e))?;
-    let planned = Planned::new(plan, technique, &onlooker, &lamps, scene.as_ref());
+        .plan(&onlooker.camera, &lights, &bounds, spec.technique())
+        .map_err(|e| spec.error(&e))?;
+    let planned = Planned::new(plan, max_side, spec, &onlooker, &lamps, scene.as_ref());
     if args.json {
         if plan.maps.iter().all(ShadowMap::is_empty) {
             log::warn!("{}", nothing_served(&onlooker));
@@ -160,21 +160,18 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
 impl<'a> Planned<'a> {
     fn new(
         plan: &'a Plan,
-        technique: &'a Technique,
+        max_side: u32,
+        spec: &'a Spec,
         onlooker: &'a Onlooker,
         lamps: &'a [Lamp],
         scene: Option<&Scene>,
     ) -> Self {
-        let filter = technique.filter;
-        let max_side = technique.options.max_side;
-        let slots: Vec<_> = plan.maps.iter().map(|m| filter.slot_texels(m.resolution)).collect();
-        let [atlas, layers] = [Atlas::packed_sizes, Atlas::layered_sizes].map(|lay_out| {
-            let atlas = lay_out(&slots, filter.reach_texels(), max_side);
-            atlas.inspect_err(|e| log::info!("no atlas: {e}")).ok()
+        let [atlas, layers] = [Atlas::packed, Atlas::layered].map(|lay_out| {
+            lay_out(plan, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
         });
         let casters = scene.map(|s| casters(plan, s));
         let culled = casters.as_ref().and_then(|c| casters_culled(plan, c));
-        Self { technique, onlooker, lamps, plan, atlas, layers, casters, culled }
+        Self { spec, onlooker, lamps, plan, atlas, layers, casters, culled }
     }
 
     /// x, y, width and height of a map in the atlas, texels.
@@ -227,12 +224,12 @@ impl<'a> Planned<'a> {
         let mut line = |l: std::fmt::Arguments<'_>| {
             let _ = writeln!(text, "{l}");
         };
-        line(format_args!("shadows         {}", self.technique.spec));
+        line(format_args!("shadows         {}", self.spec));
         for (light, lamp) in plan.lights.iter().zip(self.lamps) {
             let name = lamp.name.as_deref().filter(|_| self.lamps.len() > 1).unwrap_or("light");
             line(format_args!("view and {name:<6} {:.2}° apart", light.theta_rad.to_degrees()));
         }
-        let limit = match self.technique.options.size {
+        let limit = match self.spec.technique().size {
             Size::MaxError(pixels) => format!(", for at most {pixels} px a texel"),
             _ => String::new(),
         };
@@ -270,7 +267,7 @@ impl<'a> Planned<'a> {
             };
             let [near, far] = map.split.map(six_digits);
             line(format_args!("map {i}: {part}{size} texels{place}, {near} to {far} metres"));
-            let warp = match (map.lambda, self.technique.options.warp) {
+            let warp = match (map.lambda, self.spec.technique().warp) {
                 // For light from a point λ is no length in the world.
                 (Some(lambda), _) if map.apex.is_some() => format!("λ = {lambda:.6}"),
                 (Some(lambda), _) => format!("λ = {lambda:.6} m"),
@@ -300,7 +297,7 @@ impl<'a> Planned<'a> {
     /// What a map is for, as far as there are others.
     fn part(&self, part: Part) -> String {
         let name = || self.lamps[part.light].name.clone().unwrap_or_default();
-        let slices = self.technique.options.partition.slices;
+        let slices = self.spec.technique().partition.slices;
         let words = [
             (self.lamps.len() > 1).then(name),
             part.side.map(|s| format!("side {}", side_name(s))),

@@ -54,7 +54,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let passes = 1 + u64::from(needs_truth) + u64::from(needs_map) + moving;
     tell_notices(&scene);
     execution.announce();
-    if let Size::MaxError(pixels) = args.shadows.options.size
+    if let Size::MaxError(pixels) = args.shadows.technique().size
         && needs_map
     {
         note(&format!("texels: {} for at most {pixels} px a texel", plan.texels()));

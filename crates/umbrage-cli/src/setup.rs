@@ -88,7 +88,7 @@ fn read_scene(folder: &Path, name: &str) -> Result<Scene> {
         ensure!(!is_path, "SCENE: there is no file {shown}");
         bail!(
             "SCENE: there is neither a file nor a built-in scene `{name}`; did you mean `{}`? (built in are {})",
-            crate::spec::nearest(builtin, &names),
+            umbrage::language::nearest(builtin, names.iter().copied()),
             names.join(", ")
         );
     }

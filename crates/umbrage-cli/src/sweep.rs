@@ -39,7 +39,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
         &args.comparison.techniques.shadows,
     )?;
     let settings = SweepSettings {
-        shadows: args.comparison.techniques.shadows.iter().map(|t| t.spec.to_string()).collect(),
+        shadows: args.comparison.techniques.shadows.iter().map(|t| t.to_string()).collect(),
         max_error: args.comparison.techniques.texels.max_error,
         size: args.size,
         samples: args.comparison.samples,

@@ -103,8 +103,12 @@ pub struct Motion {
 /// One technique's figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// The shadow specification, e.g. `lispsm@1024`.
+    /// The shadow specification as it was asked for, e.g. `lispsm@1024`.
     pub shadows: String,
+    /// The technique that was executed, as `umbrage::Technique` prints it: with the texels that an
+    /// option asked for, without what is so by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub technique: Option<String>,
     /// What executed the plan: `reference` or `gpu`.
     pub backend: String,
     /// The GPU's name.
@@ -187,6 +191,7 @@ pub(crate) mod tests {
     pub(crate) fn report(wrong: &[Option<f64>]) -> Report {
         let result = |(i, &wrong): (usize, &Option<f64>)| Measured {
             shadows: format!("lambda={i}@1024"),
+            technique: None,
             backend: "reference".to_owned(),
             device: None,
             maps: 1,

@@ -276,6 +276,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         // Sweeps stand still, and their tables tell no times.
         let Measured {
             shadows,
+            technique: _,
             backend,
             device,
             maps,

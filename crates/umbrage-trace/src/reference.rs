@@ -118,7 +118,6 @@ fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
 #[derive(Clone, Debug)]
 pub struct Reference<'a> {
     plan: &'a Plan,
-    filter: Filter,
     maps: Vec<DepthMap>,
     /// One a map if the filter is applied ahead of lookup, else none.
     statistics: Vec<StatisticMap>,
@@ -159,17 +158,17 @@ pub struct MapTexel {
 }
 
 impl<'a> Reference<'a> {
-    /// Renders the depths of all maps, with the gutter that `filter` needs. `progress` is told of
-    /// each row of texels; there are [`rows`](Self::rows).
+    /// Renders the depths of all maps, with the gutter that the plan's filter needs. `progress` is told
+    /// of each row of texels; there are [`rows`](Self::rows).
     ///
     /// # Errors
     /// A map that does not fit into memory.
     pub fn render(
         tracer: &Tracer<'_>,
         plan: &'a Plan,
-        filter: Filter,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
+        let filter = plan.filter;
         let render = |map: &ShadowMap| {
             let drawn = filter.drawn_texels(map.resolution);
             DepthMap::render_drawn(tracer, map, filter.reach_texels(), drawn, progress)
@@ -184,22 +183,22 @@ impl<'a> Reference<'a> {
             }
             _ => Vec::new(),
         };
-        Ok(Self { plan, filter, maps, statistics })
+        Ok(Self { plan, maps, statistics })
     }
 
     /// Rows of texels that [`render`](Self::render) will report.
-    pub fn rows(plan: &Plan, filter: Filter) -> u64 {
+    pub fn rows(plan: &Plan) -> u64 {
         let full = plan.maps.iter().filter(|m| !m.is_empty());
-        full.map(|m| u64::from(filter.drawn_texels(m.resolution)[1])).sum()
+        full.map(|m| u64::from(plan.filter.drawn_texels(m.resolution)[1])).sum()
     }
 
     /// Memory of all that is looked up, bytes: what a texel takes on a GPU, gutters included.
     pub fn bytes(&self) -> u64 {
         let stored = |m: &DepthMap| m.texels.len() as u64;
-        let texels =
-            self.maps.iter().map(stored).sum::<u64>() * u64::from(bytes_per_texel(self.filter));
+        let texels = self.maps.iter().map(stored).sum::<u64>()
+            * u64::from(bytes_per_texel(self.plan.filter));
         // A quarter, a sixteenth … of smaller and smaller copies.
-        let levels = match self.filter {
+        let levels = match self.plan.filter {
             Filter::Prefiltered(prefilter) => {
                 let first = prefilter.first_level();
                 first..first + prefilter.levels()
@@ -224,11 +223,12 @@ impl<'a> Reference<'a> {
         let surface = &sample.surface;
         let (mut sum, mut shares) = (0.0, 0.0);
         for (index, share) in self.plan.lookup(light, surface.position) {
-            let map = &self.plan.maps[index];
-            let value = map.receiver(surface.position, surface.geometric_normal).map_or(1.0, |r| {
+            let (position, normal) = (surface.position, surface.geometric_normal);
+            let value = self.plan.receiver(index, position, normal).map_or(1.0, |r| {
                 let depths = &self.maps[index];
                 let statistics = self.statistics.get(index);
-                visibility(map, self.filter, &r, Filtered { depths, statistics })
+                let map = &self.plan.maps[index];
+                visibility(map, self.plan.filter, &r, Filtered { depths, statistics })
             });
             sum += share * f64::from(value);
             shares += share;

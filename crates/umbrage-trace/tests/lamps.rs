@@ -5,8 +5,8 @@ mod common;
 use common::{ground, nobody, plan, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
-use umbrage::{Camera, Light, LookAt, Options, PointLight, Size, SpotLight, Warp};
+use umbrage::visibility::{Blur, Filter, LightSize, Prefilter, Width};
+use umbrage::{Camera, Light, LookAt, PointLight, SpotLight, Technique, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
 #[test]
@@ -47,7 +47,8 @@ fn lamps_are_filtered_as_well_as_compared() {
         [Blur::Texels(3), Blur::Width(Width::Pixels(2.0))]
             .map(|blur| Filter::Prefiltered(Prefilter { statistic, blur, half: false }))
     });
-    let filters: Vec<Filter> = filters.chain([Filter::Pcss { n: 4, source: 0.05 }]).collect();
+    let filters: Vec<Filter> =
+        filters.chain([Filter::Pcss { n: 4, light: LightSize::Metres(0.05) }]).collect();
     for light in [Light::Spot(spot), Light::Point(point)] {
         for warp in [Warp::Uniform, Warp::Lispsm] {
             let view = View::new(&tracer, camera, light, 1).unwrap();
@@ -56,14 +57,9 @@ fn lamps_are_filtered_as_well_as_compared() {
             let dark = truth.iter().flatten().filter(|&&t| t == 0.0).count();
             assert!(dark > 300, "{dark} pixels in shadow");
             let wrong = |filter: Filter| {
-                let options = Options {
-                    warp,
-                    size: Size::Budget(1024 * 1024),
-                    keeps_casters: matches!(filter, Filter::Pcss { .. }),
-                    ..Options::default()
-                };
-                let plan = plan(&scene, &camera, light, &options);
-                let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
+                let technique = Technique { warp, filter, ..Technique::default() };
+                let plan = plan(&scene, &camera, light, &technique);
+                let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
                 let visibility = band.map(|s| reference.visibility(0, s), &nobody);
                 let pairs = truth.iter().zip(visibility);
                 let off = pairs.filter(|(t, v)| t.is_some_and(|t| (t - v).abs() > 0.5)).count();

@@ -7,7 +7,7 @@ use glam::DVec2;
 use std::path::PathBuf;
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, texel_coordinates};
-use umbrage::{Bounds, Camera, Options, Plan, Planner, Receiver, Size, Warp};
+use umbrage::{Bounds, Camera, Plan, Planner, Receiver, Technique, Warp};
 use umbrage_scene::Scene;
 use umbrage_trace::{DepthMap, Reference, Tracer, View};
 
@@ -46,17 +46,18 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let light = scene.default_light().light;
     let boxes = tracer.boxes(256);
     let bounds = Bounds { receiver_parts: &boxes, ..Bounds::of_scene(scene.bounds()) };
-    let options =
-        Options { warp: Warp::Uniform, size: Size::Budget(1 << 20), ..Options::default() };
-    let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
+    let plan_for = |filter| {
+        let technique = Technique { warp: Warp::Uniform, filter, ..Technique::default() };
+        Planner::new().plan(&camera, &[light], &bounds, &technique).unwrap().clone()
+    };
+    let plan = &plan_for(Filter::Pcf { n: 9 });
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let band = view.band(0..camera.image()[1], &nobody);
-    let hard = Reference::render(&tracer, plan, Filter::Pcf { n: 9 }, &nobody).unwrap();
+    let hard = Reference::render(&tracer, plan, &nobody).unwrap();
     let shadowed = band.map(
         |s| {
             let surface = &s.surface;
-            let receiver = plan.maps[0].receiver(surface.position, surface.geometric_normal)?;
+            let receiver = plan.receiver(0, surface.position, surface.geometric_normal)?;
             let is_dark = s.is_facing && view.truth(s) == 0.0;
             is_dark.then(|| exact(plan, &hard.depth_maps()[0], &receiver))
         },
@@ -64,7 +65,8 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     );
     let of = |&statistic: &Statistic| {
         let filter = Filter::Prefiltered(Prefilter { statistic, blur: BLUR, half: false });
-        let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
+        let plan = plan_for(filter);
+        let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
         let visibility = band.map(|s| Some(reference.visibility(0, s)), &nobody);
         let mut sums = [(0.0, 0u32); 2];
         for (exact, visibility) in shadowed.iter().zip(visibility) {

@@ -6,47 +6,47 @@ use common::{Random, at, camera, even_map, ground, nobody, scene, sheet, towards
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use umbrage::visibility::{Filter, visibility};
 use umbrage::{
-    Bounds, Camera, CubeSide, Light, Objective, Options, Plan, Planner, PointLight, Rows,
-    ShadowMap, Size, SpotLight, Warp,
+    Bounds, Camera, CubeSide, Light, Plan, Planner, PointLight, Size, SpotLight, Technique,
 };
 use umbrage_scene::closed_form::pole_shadows;
 use umbrage_scene::{Scene, builtin};
 use umbrage_trace::{DepthMap, Error, Reference, Surface, Tracer, View};
 
-const WARPS: [Warp; 9] = [
-    Warp::Unfocused,
-    Warp::Uniform,
-    Warp::Psm,
-    Warp::Lispsm,
-    Warp::Tsm { focus: None },
-    Warp::Adaptive(Objective::Storage),
-    Warp::Adaptive(Objective::Area),
-    Warp::Log,
-    Warp::Lambda(2.0),
+/// How texels are spread, and over what.
+const SPREADS: [&str; 9] = [
+    "unfocused",
+    "uniform",
+    "psm",
+    "lispsm",
+    "tsm",
+    "adaptive",
+    "adaptive(area)",
+    "log",
+    "lambda=2",
 ];
 
 fn filters() -> [Filter; 5] {
     [0, 1, 2, 3, 8].map(|n| Filter::pcf(n).unwrap_or(Filter::Hard))
 }
 
-fn plan(camera: &Camera, light: &Light, tracer: &Tracer<'_>, warp: Warp, texels: u64) -> Plan {
-    sized(camera, light, tracer, warp, Size::Budget(texels))
+fn plan(camera: &Camera, light: &Light, tracer: &Tracer<'_>, spread: &str, texels: u64) -> Plan {
+    sized(camera, light, tracer, spread, Size::Budget(texels))
 }
 
-fn sized(camera: &Camera, light: &Light, tracer: &Tracer<'_>, warp: Warp, size: Size) -> Plan {
-    let options = Options { warp, size, ..Options::default() };
+fn sized(camera: &Camera, light: &Light, tracer: &Tracer<'_>, spread: &str, size: Size) -> Plan {
+    let technique = Technique { size, ..spread.parse().unwrap() };
     let bounds = Bounds::of_scene(tracer.bounds());
-    Planner::new().plan(camera, &[*light], &bounds, &options).unwrap().clone()
+    Planner::new().plan(camera, &[*light], &bounds, &technique).unwrap().clone()
 }
 
-fn lookup(map: &ShadowMap, depths: &DepthMap, filter: Filter, surface: &Surface) -> f32 {
-    let receiver = map.receiver(surface.position, surface.geometric_normal).unwrap();
-    visibility(map, filter, &receiver, |i, j| depths.texel(i, j))
+fn lookup(plan: &Plan, depths: &DepthMap, filter: Filter, surface: &Surface) -> f32 {
+    let receiver = plan.receiver(0, surface.position, surface.geometric_normal).unwrap();
+    visibility(&plan.maps[0], filter, &receiver, |i, j| depths.texel(i, j))
 }
 
 /// The shares of facing samples that are lit but should be dark, and the other way round.
-fn wrong(view: &View<'_>, plan: &Plan, filter: Filter) -> [f64; 2] {
-    let reference = Reference::render(view.tracer(), plan, filter, &nobody).unwrap();
+fn wrong(view: &View<'_>, plan: &Plan) -> [f64; 2] {
+    let reference = Reference::render(view.tracer(), plan, &nobody).unwrap();
     let band = view.band(0..view.camera().image()[1], &nobody);
     let (mut counts, mut all) = ([0.0; 2], 0.0);
     for sample in band.samples().iter().flatten().filter(|s| s.is_facing) {
@@ -124,8 +124,8 @@ fn empty_and_absurd_maps() {
     // A camera that sees nothing: an empty plan, all is lit.
     let away = camera(DVec3::Y * 50.0, DVec3::Y * 51.0, [8, 8]);
     let light = Light::Directional { direction: -DVec3::Y };
-    let plan = plan(&away, &light, &tracer, Warp::Uniform, 64);
-    let reference = Reference::render(&tracer, &plan, Filter::Hard, &nobody).unwrap();
+    let plan = plan(&away, &light, &tracer, "uniform", 64);
+    let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
     assert_eq!(reference.texel(0, DVec3::ZERO), None);
     // A scene without triangles.
     let nothing = Scene::default();
@@ -149,15 +149,16 @@ fn planes_have_no_acne_at_any_angle() {
             let travel = tilt * DVec3::new(cos * 0.6, -sin, cos * 0.8);
             let mut map = even_map(offset, travel, 4.0, 300.0, [40, 56]);
             if round % 3 == 0 {
-                map.rows = Rows::Logarithmic { ratio: 20.0 };
+                map.rows = umbrage::Rows::Logarithmic { ratio: 20.0 };
             }
             let depths = DepthMap::render(&tracer, &map, 8, &nobody).unwrap();
+            let plan = Plan { maps: vec![map], ..Plan::default() };
             for _ in 0..300 {
                 let at = random.in_square(3.0);
                 let above = place.transform_point3(DVec3::new(at.x, 2.0, at.y));
                 let surface = towards(&tracer, above, tilt * -DVec3::Y);
                 for filter in filters() {
-                    let lit = lookup(&map, &depths, filter, &surface);
+                    let lit = lookup(&plan, &depths, filter, &surface);
                     assert_eq!(lit, 1.0, "{filter} at {elevation_deg}°, {offset}");
                 }
             }
@@ -173,6 +174,7 @@ fn shadows_end_within_a_texel_of_where_they_should() {
     let texel = 8.0 / 400.0;
     let map = even_map(DVec3::new(1.0, 0.5, 0.5), travel, 4.0, 12.0, [400, 400]);
     let depths = DepthMap::render(&tracer, &map, 8, &nobody).unwrap();
+    let plan = Plan { maps: vec![map], ..Plan::default() };
     let mut random = Random(9);
     let mut counts = [0, 0];
     for _ in 0..30_000 {
@@ -194,7 +196,7 @@ fn shadows_end_within_a_texel_of_where_they_should() {
             let at_foot = surface.position.abs().max_element() < 0.1 + 2.0 * texel;
             if is_clear(reach(width)) && !at_foot {
                 counts[usize::from(expected)] += 1;
-                let lit = lookup(&map, &depths, filter, &surface);
+                let lit = lookup(&plan, &depths, filter, &surface);
                 assert_eq!(lit, f32::from(u8::from(!expected)), "{filter} at {}", surface.position);
             }
         }
@@ -218,16 +220,16 @@ fn every_warp_approaches_the_truth() {
     });
     for light in [sun, lamp] {
         let view = View::new(&tracer, camera, light, 1).unwrap();
-        for warp in WARPS {
+        for spread in SPREADS {
             let at = |side: u64| {
-                let plan = plan(&camera, &light, &tracer, warp, side * side);
-                wrong(&view, &plan, Filter::Hard).iter().sum::<f64>()
+                let plan = plan(&camera, &light, &tracer, spread, side * side);
+                wrong(&view, &plan).iter().sum::<f64>()
             };
             let [coarse, fine] = [at(128), at(1024)];
-            assert!(fine < 0.01, "{warp:?}: {fine} of the samples are wrong");
+            assert!(fine < 0.01, "{spread}: {fine} of the samples are wrong");
             assert!(
                 fine < 0.4 * coarse,
-                "{warp:?}: {coarse}, then {fine} with 64 times the texels"
+                "{spread}: {coarse}, then {fine} with 64 times the texels"
             );
         }
     }
@@ -245,15 +247,15 @@ fn all_sides_of_a_point_light_approach_the_truth() {
         let look = camera(DVec3::from(eye), DVec3::Y * height, [160, 120]);
         look.with_depth_range(0.2, 20.0).unwrap()
     });
-    for warp in WARPS {
+    for spread in SPREADS {
         // For each side of the cube: samples, and those wrong with few texels and with many.
         let mut counts = [[0; 3]; 6];
         for camera in &cameras {
             let view = View::new(&tracer, *camera, light, 1).unwrap();
             let band = view.band(0..120, &nobody);
             let [coarse, fine] =
-                [16, 256].map(|n| sized(camera, &light, &tracer, warp, Size::Exact([n, n])));
-            let render = |plan| Reference::render(&tracer, plan, Filter::Hard, &nobody).unwrap();
+                [16, 256].map(|n| sized(camera, &light, &tracer, spread, Size::Exact([n, n])));
+            let render = |plan| Reference::render(&tracer, plan, &nobody).unwrap();
             let references = [render(&coarse), render(&fine)];
             for sample in band.samples().iter().flatten().filter(|s| s.is_facing) {
                 let from_light = sample.surface.position - flame.position;
@@ -270,7 +272,7 @@ fn all_sides_of_a_point_light_approach_the_truth() {
             }
         }
         for (side, [all, coarse, fine]) in CubeSide::ALL.iter().zip(counts) {
-            let what = format!("{warp:?} {side:?}: {coarse}, then {fine} of {all} are wrong");
+            let what = format!("{spread} {side:?}: {coarse}, then {fine} of {all} are wrong");
             assert!(all > 3000 && coarse > all / 10, "{what}");
             assert!(fine < all / 10 && 5 * fine < 2 * coarse, "{what}");
         }
@@ -294,15 +296,17 @@ fn flat_ground_is_lit_under_every_plan() {
         let light = Light::Directional { direction };
         let view = View::new(&tracer, look, light, 1).unwrap();
         let band = view.band(0..18, &nobody);
-        let warp = WARPS[round % WARPS.len()];
-        let plan = plan(&look, &light, &tracer, warp, 64 * 64);
+        let spread = SPREADS[round % SPREADS.len()];
+        let plan = plan(&look, &light, &tracer, spread, 64 * 64);
         for filter in filters() {
-            let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
+            // What is drawn beyond the map's border is the filter's own affair.
+            let plan = Plan { filter, ..plan.clone() };
+            let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
             for sample in band.samples().iter().flatten().filter(|s| s.depth < 79.9) {
                 let lit = reference.visibility(0, sample);
                 let place = reference.texel(0, sample.surface.position);
-                assert!(place.is_some(), "{warp:?} holds {}", sample.surface.position);
-                assert_eq!(lit, 1.0, "{warp:?} {filter}: {light:?} {sample:?}");
+                assert!(place.is_some(), "{spread} holds {}", sample.surface.position);
+                assert_eq!(lit, 1.0, "{spread} {filter}: {light:?} {sample:?}");
             }
         }
     }
@@ -329,19 +333,21 @@ fn a_plane_is_lit_all_around_a_point_light() {
         let light = Light::Point(PointLight { position, near: 0.01, range: 60.0 });
         let view = View::new(&tracer, look, light, 1).unwrap();
         let band = view.band(0..18, &nobody);
-        let warp = WARPS[round % WARPS.len()];
-        let plan = sized(&look, &light, &tracer, warp, Size::Exact([24, 24]));
+        let spread = SPREADS[round % SPREADS.len()];
+        let plan = sized(&look, &light, &tracer, spread, Size::Exact([24, 24]));
         for filter in filters() {
-            let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
+            // What is drawn beyond the map's border is the filter's own affair.
+            let plan = Plan { filter, ..plan.clone() };
+            let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
             let facing = band.samples().iter().flatten().filter(|s| s.is_facing && s.depth < 39.9);
             for sample in facing {
                 assert_eq!(view.truth(sample), 1.0, "{light:?} {sample:?}");
                 let place = reference.texel(0, sample.surface.position);
-                let Some(place) = place else { panic!("{warp:?}: no map for {sample:?}") };
+                let Some(place) = place else { panic!("{spread}: no map for {sample:?}") };
                 let side = plan.maps[place.map].part.side;
                 sides[CubeSide::ALL.iter().position(|s| Some(*s) == side).unwrap()] += 1;
                 let lit = reference.visibility(0, sample);
-                assert_eq!(lit, 1.0, "{warp:?} {filter}: {light:?} {sample:?}");
+                assert_eq!(lit, 1.0, "{spread} {filter}: {light:?} {sample:?}");
             }
         }
     }
@@ -363,9 +369,8 @@ fn a_scene_far_from_the_origin_loses_nothing() {
         let look = camera(eye, DVec3::new(1.3, 0.9, 0.0) + offset, [120, 90]);
         let camera = look.with_depth_range(0.5, 60.0).unwrap();
         let view = View::new(&tracer, camera, light, 1).unwrap();
-        let warp = Warp::Adaptive(Objective::Storage);
-        let plan = plan(&camera, &light, &tracer, warp, 256 * 256);
-        wrong(&view, &plan, Filter::Pcf { n: 2 })
+        let plan = plan(&camera, &light, &tracer, "adaptive:pcf2", 256 * 256);
+        wrong(&view, &plan)
     };
     let [a, b] = [wrong_at(&near, DVec3::ZERO), wrong_at(&far, offset)];
     for (a, b) in a.iter().zip(b) {

@@ -5,8 +5,7 @@ mod common;
 use common::{Random, all_hits, nobody};
 use glam::DVec3;
 use std::path::PathBuf;
-use umbrage::visibility::Filter;
-use umbrage::{Bounds, Camera, Light, LookAt, Options, Planner, Size};
+use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique};
 use umbrage_scene::Scene;
 use umbrage_trace::{Ray, Reference, Tracer, View};
 
@@ -67,12 +66,12 @@ fn a_real_level_comes_out_right() {
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let band = view.band(0..270, &nobody);
     let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());
-    let options = Options { size: Size::Budget(2048 * 2048), ..Options::default() };
+    let bounds = Bounds::of_scene(tracer.bounds());
     let mut planner = Planner::new();
-    let plan =
-        planner.plan(&camera, &[light], &Bounds::of_scene(tracer.bounds()), &options).unwrap();
-    for filter in [Filter::Hard, Filter::pcf(2).unwrap()] {
-        let reference = Reference::render(&tracer, plan, filter, &nobody).unwrap();
+    for text in ["adaptive@2048", "adaptive:pcf2@2048"] {
+        let technique: Technique = text.parse().unwrap();
+        let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
+        let reference = Reference::render(&tracer, plan, &nobody).unwrap();
         let lit = band.map(|s| reference.visibility(0, s), &nobody);
         let lit = band.means_facing(&lit, camera.far());
         let pairs = truth.iter().zip(&lit).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
@@ -80,6 +79,6 @@ fn a_real_level_comes_out_right() {
             (wrong + usize::from((truth - lit).abs() > 0.5), all + 1)
         });
         let share = wrong as f64 / all as f64;
-        assert!(all > 60_000 && share < 0.01, "{filter}: {wrong} of {all} are wrong");
+        assert!(all > 60_000 && share < 0.01, "{text}: {wrong} of {all} are wrong");
     }
 }

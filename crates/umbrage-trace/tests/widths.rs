@@ -5,8 +5,8 @@ mod common;
 use common::{ground, nobody, plan, scene, sheet};
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::visibility::statistic::{Csm, Statistic};
-use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
-use umbrage::{Camera, Light, LookAt, Objective, Options, Partition, Size, Warp};
+use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
+use umbrage::{Camera, Light, LookAt, Objective, Partition, Size, Technique, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
 /// Light that falls a little sideways onto the ground, past the straight edge of a sheet 3 m above it.
@@ -35,15 +35,15 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
     let tracer = Tracer::new(&scene).unwrap();
     let camera = camera();
     let light = Light::Directional { direction: LIGHT };
-    let options = Options {
+    let technique = Technique {
         warp,
         partition: Partition { overlap: 0.2, ..Partition::slices(slices) },
         size: Size::Budget(1536 * 1536),
-        keeps_casters: matches!(filter, Filter::Pcss { .. }),
-        ..Options::default()
+        filter,
+        ..Technique::default()
     };
-    let plan = plan(&scene, &camera, light, &options);
-    let reference = Reference::render(&tracer, &plan, filter, &nobody).unwrap();
+    let plan = plan(&scene, &camera, light, &technique);
+    let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let lit = |x: f64, z: f64| {
         let pixel = camera.pixel(DVec3::new(x, 0.0, z)).unwrap();
@@ -133,11 +133,12 @@ fn pixels_are_those_of_the_picture() {
 /// wide as that.)
 #[test]
 fn penumbrae_follow_the_distance_of_what_casts_them() {
-    let source = 0.4;
+    let source = 0.4f64;
+    let angle = (2.0 * (0.5 * source).atan()).to_degrees();
     // From 10% to 90% of a disc's area it is so far along its diameter; the sheet lies 3 m above.
     let expected = 0.687 * source * 3.0 / LIGHT.normalize().y.abs();
     for (warp, slices) in &TECHNIQUES[..3] {
-        let filter = Filter::Pcss { n: 8, source: source as f32 };
+        let filter = Filter::Pcss { n: 8, light: LightSize::Degrees(angle as f32) };
         for ramp in ramps(filter, *warp, *slices) {
             let ratio = ramp.metres / expected;
             assert!((ratio - 1.0).abs() < 0.25, "{warp:?}: {ratio} {ramp:?}");

@@ -11,8 +11,7 @@ mod headless;
 use bytemuck::{bytes_of, cast_slice};
 use glam::{DAffine3, DVec3, Vec3, camera::rh};
 use std::error::Error;
-use umbrage::visibility::Filter;
-use umbrage::{Aabb, Bounds, Camera, ClipDepth, Light, Options, Partition, Planner};
+use umbrage::{Aabb, Bounds, Camera, ClipDepth, Light, Planner, Technique};
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
     Timestamps,
@@ -84,13 +83,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         |m: DAffine3| Aabb::around(corners.map(|corner| m.transform_point3(corner.as_dvec3())));
     let boxes: Vec<Aabb> = models().map(around).collect();
     let bounds = Bounds { receiver_parts: &boxes, ..Bounds::default() };
-    let options = Options { partition: Partition::slices(2), ..Options::default() };
+    let technique: Technique = "adaptive+z2:pcf3".parse()?;
     let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &options)?;
+    let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &technique)?;
 
     // 3. The shadows themselves, once: what filters them. And a pipeline that draws casters; for one of your own,
     //    `Shadows::caster_wgsl`, `depth_stencil_state` and `primitive_state` have what it needs.
-    let shadow_options = ShadowOptions { filter: Filter::pcf(3)?, ..Default::default() };
+    let shadow_options = ShadowOptions { filter: technique.filter, ..Default::default() };
     let mut shadows = Shadows::new(&device, Support::new(&adapter, &device)?, &shadow_options)?;
     let positions = wgpu::VertexBufferLayout {
         array_stride: 12,
@@ -120,8 +119,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
     shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, &Timestamps::default(), |map| {
         map.pass.set_pipeline(casters.pipeline());
-        for (i, _) in (0..).zip(&boxes).filter(|(_, aabb)| map.map.may_cast(**aabb)) {
-            draw(map.pass, i);
+        for (i, aabb) in (0..).zip(&boxes) {
+            if map.may_cast(*aabb) {
+                draw(map.pass, i);
+            }
         }
     });
 

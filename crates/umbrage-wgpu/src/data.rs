@@ -106,11 +106,11 @@ impl Lookup {
             padding: 0,
             texture_scale: placed.texture_size.map(|n| 1.0 / n.max(1) as f32),
             padding_too: [0.0; 2],
-            pixel_gradient: plan.maps.first().map_or(Vec4::ZERO, |map| {
-                let offset = local_from_render(map, placed.render_origin).w_axis.truncate();
-                let gradient = map.pixel_gradient;
-                gradient.extend(gradient.dot(offset)).as_vec4()
-            }),
+            pixel_gradient: {
+                let local_from_render = placed.render_origin - plan.origin;
+                let gradient = plan.pixel_gradient;
+                gradient.extend(gradient.dot(local_from_render)).as_vec4()
+            },
             eye: (plan.origin - placed.render_origin).extend(1.0).as_vec4(),
         };
     }

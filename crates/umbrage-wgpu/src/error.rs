@@ -1,4 +1,5 @@
 use umbrage::AtlasTooLarge;
+use umbrage::visibility::Filter;
 
 /// Why there are no shadows.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,6 +34,20 @@ pub enum Error {
     LogarithmicRows {
         /// Index of the map in the plan.
         map: usize,
+    },
+    /// The plan is for another filter than the shadows look maps up with: casters would be missing at
+    /// the maps' borders, or soft shadows would not know how far casters lie. Plan with the
+    /// [`Technique`](umbrage::Technique) whose filter the
+    /// [`ShadowOptions`](crate::ShadowOptions::filter) have.
+    #[error(
+        "the plan is for the filter `{planned}`, but the maps are looked up with `{looked_up}`: give both the \
+         same technique's filter"
+    )]
+    OtherFilter {
+        /// The plan's.
+        planned: Filter,
+        /// The shadows' own.
+        looked_up: Filter,
     },
     /// A field's value makes no sense.
     #[error("{field}: {problem}")]

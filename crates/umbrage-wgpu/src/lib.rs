@@ -36,18 +36,22 @@
 //! #     bounds: &Bounds<'_>, models: &[Model], caster_pipeline: &wgpu::RenderPipeline) -> Result<(), Box<dyn std::error::Error>> {
 //! // Once:
 //! let support = Support::new(adapter, device)?;
-//! let mut shadows = Shadows::new(device, support, &ShadowOptions::default())?;
+//! let technique: Technique = "adaptive+z4:pcf3@2048".parse()?;
+//! let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+//! let mut shadows = Shadows::new(device, support, &options)?;
 //! let mut planner = Planner::new();
 //!
 //! // Each frame:
-//! let plan = planner.plan(camera, &[sun], bounds, &Options::default())?;
-//! let frame = Frame { plan, render_origin: glam::DVec3::ZERO, casters: Casters::Still };
+//! let plan = planner.plan(camera, &[sun], bounds, &technique)?;
+//! let frame = Frame { plan, render_origin: glam::DVec3::ZERO, casters: Casters::Moved };
 //! let prepared = shadows.prepare(device, queue, &frame)?;
 //! let mut encoder = device.create_command_encoder(&Default::default());
 //! prepared.encode(&mut encoder, &Timestamps::default(), |map| {
 //!     map.pass.set_pipeline(caster_pipeline);
-//!     for model in models.iter().filter(|m| map.map.may_cast(m.aabb)) {
-//!         model.draw(map.pass);
+//!     for model in models {
+//!         if map.may_cast(model.aabb) {
+//!             model.draw(map.pass);
+//!         }
 //!     }
 //! });
 //! // Then shade, with `shadows.lookup_bind_group()` bound.
@@ -56,7 +60,7 @@
 //!
 //! # What a frame costs
 //!
-//! Maps whose matrix, size and casters are as they were are not drawn again: with [`Casters::Still`] and an unmoved
+//! Maps whose matrix, size and casters are as they were are not drawn again: with [`Casters::Unmoved`] and an unmoved
 //! camera nothing is encoded at all. Empty maps have no texels and no pass. Buffers grow and are kept; the
 //! texture is made anew only where a map outgrows its place.
 //!

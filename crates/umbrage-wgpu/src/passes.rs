@@ -3,7 +3,7 @@
 use crate::shadows::{Record, Shadows, depth_state};
 use glam::{DVec3, Mat4};
 use umbrage::visibility::Filter;
-use umbrage::{Place, Plan, ShadowMap};
+use umbrage::{Aabb, Place, Plan, ShadowMap};
 use wgpu::{
     CommandEncoder, CompareFunction, Device, LoadOp, Operations, PipelineCompilationOptions,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassDepthStencilAttachment,
@@ -26,14 +26,23 @@ pub struct Prepared<'a> {
 pub struct MapPass<'p, 'e> {
     /// Draw casters into this.
     pub pass: &'p mut RenderPass<'e>,
-    /// The map: [`may_cast`](ShadowMap::may_cast) says which casters to leave out, or its caster planes.
-    pub map: &'p ShadowMap,
+    /// The map as planned: its caster planes say which casters to leave out, as
+    /// [`may_cast`](Self::may_cast) does for boxes.
+    pub shadow_map: &'p ShadowMap,
     /// Its index in the plan.
     pub index: usize,
     /// From render space to the pass's clip space, for pipelines that do not take it from bind group 0.
     pub clip_from_render: Mat4,
     /// World position of render space's origin, metres.
     pub render_origin: DVec3,
+}
+
+impl MapPass<'_, '_> {
+    /// Whether anything in `aabb` (world space) can cast a shadow into the map. Never `false` for
+    /// what does; `true` for some of what does not.
+    pub fn may_cast(&self, aabb: Aabb) -> bool {
+        self.shadow_map.may_cast(aabb)
+    }
 }
 
 /// Where to write when passes begin and end.
@@ -109,7 +118,7 @@ impl Prepared<'_> {
                 pass.set_bind_group(0, &casters.bind_group, &[index as u32 * casters.stride]);
                 draw(&mut MapPass {
                     pass: &mut pass,
-                    map: &plan.maps[index],
+                    shadow_map: &plan.maps[index],
                     index,
                     clip_from_render: record.clip_from_render.as_mat4(),
                     render_origin,

@@ -85,7 +85,7 @@ pub enum Casters<'a> {
     /// What changed lies in these boxes (world space), before and after. Draw the maps into which they cast.
     MovedIn(&'a [Aabb]),
     /// Nothing.
-    Still,
+    Unmoved,
 }
 
 /// The shadow maps of one view: their depths, and what shaders look them up by.
@@ -355,7 +355,8 @@ impl Shadows {
     /// Drop the result and nothing is drawn now, but next time.
     ///
     /// # Errors
-    /// Maps that a GPU cannot draw, or that do not fit into the device's textures; then nothing has changed.
+    /// A plan for another filter, maps that a GPU cannot draw, or that do not fit into the device's
+    /// textures; then nothing has changed.
     pub fn prepare<'a>(
         &'a mut self,
         device: &Device,
@@ -363,6 +364,12 @@ impl Shadows {
         frame: &Frame<'a>,
     ) -> Result<Prepared<'a>, Error> {
         let Frame { plan, render_origin, casters } = *frame;
+        if plan.filter != self.options.filter {
+            return Err(Error::OtherFilter {
+                planned: plan.filter,
+                looked_up: self.options.filter,
+            });
+        }
         if !render_origin.is_finite() {
             return Err(Error::Invalid {
                 field: "frame.render_origin",
@@ -413,7 +420,7 @@ impl Shadows {
             let changed = match casters {
                 Casters::Moved => true,
                 Casters::MovedIn(boxes) => boxes.iter().any(|&b| map.may_cast(b)),
-                Casters::Still => false,
+                Casters::Unmoved => false,
             };
             if changed || self.texture.is_fresh || !record.is_of(map, *place) {
                 record.set(map, *place);

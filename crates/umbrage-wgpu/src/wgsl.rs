@@ -57,15 +57,16 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
         Filter::Spread { n, pattern, .. } => {
             spread(&filter, n, pattern) + include_str!("wgsl/spread.wgsl")
         }
-        Filter::Pcss { n, source } => {
+        Filter::Pcss { n, light } => {
             spread(&filter, n, Pattern::Poisson)
-                + &include_str!("wgsl/pcss.wgsl").replace("{SOURCE}", &number(source))
+                + &include_str!("wgsl/pcss.wgsl").replace("{SOURCE}", &number(light.diameter()))
         }
         Filter::Pcf { n } => {
             let n = n.clamp(1, Filter::MAX_PCF).to_string();
             include_str!("wgsl/pcf_weight.wgsl").replace("{N}", &n) + pcf
         }
-        _ => hard.to_owned(),
+        Filter::Hard => hard.to_owned(),
+        Filter::Prefiltered(_) => String::new(),
     }
 }
 
@@ -188,8 +189,6 @@ fn statistic(statistic: &Statistic) -> String {
                 .replace("{GAIN}", &number(s.gain()))
                 .replace("{LEAK}", &number(s.leak()))
         }
-        // The core's list is open to it alone.
-        _ => String::new(),
     };
     let textures = textures(statistic).to_string();
     [include_str!("wgsl/slab.wgsl"), chebyshev, &own.replace("{TEXTURES}", &textures), ""]
@@ -291,6 +290,7 @@ mod tests {
     use crate::data;
     use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
     use std::mem::{offset_of, size_of};
+    use umbrage::visibility::LightSize;
     use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Vsm};
 
     fn validated(text: &str) -> (naga::Module, ModuleInfo) {
@@ -358,7 +358,7 @@ mod tests {
         let spread = [Pattern::Grid, Pattern::Poisson]
             .into_iter()
             .flat_map(move |pattern| widths.map(|width| Filter::Spread { n: 5, width, pattern }));
-        let soft = [1, 8].map(|n| Filter::Pcss { n, source: 0.5 });
+        let soft = [1, 8].map(|n| Filter::Pcss { n, light: LightSize::Metres(0.5) });
         let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
         let filters = filters.chain(prefiltered).chain(spread).chain(soft);
         let with = |filter| {

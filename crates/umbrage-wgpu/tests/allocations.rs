@@ -5,7 +5,7 @@
 use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Partition, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Partition, Planner, Technique};
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Support, Timestamps};
 
 struct Counting;
@@ -51,13 +51,13 @@ fn a_still_frame_allocates_nothing() {
     .unwrap();
     let sun = Light::Directional { direction: DVec3::new(0.5, -1.0, 0.25) };
     let bounds = Bounds::of_scene(Aabb::new(DVec3::splat(-20.0), DVec3::splat(20.0)));
-    let options = Options { partition: Partition::slices(4), ..Options::default() };
+    let technique = Technique { partition: Partition::slices(4), ..Technique::default() };
     let mut planner = Planner::new();
     let moved = [Aabb::new(DVec3::splat(-900.0), DVec3::splat(-800.0))];
     let mut counts = Vec::new();
     for i in 0..4 {
-        let plan = planner.plan(&camera, &[sun], &bounds, &options).unwrap();
-        let casters = if i % 2 == 0 { Casters::Still } else { Casters::MovedIn(&moved) };
+        let plan = planner.plan(&camera, &[sun], &bounds, &technique).unwrap();
+        let casters = if i % 2 == 0 { Casters::Unmoved } else { Casters::MovedIn(&moved) };
         let mut encoder = device.create_command_encoder(&Default::default());
         let before = ALLOCATIONS.with(Cell::get);
         let frame = Frame { plan, render_origin: DVec3::ZERO, casters };

@@ -4,12 +4,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use std::hint::black_box;
-use umbrage::{
-    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Planner, Splits,
-    Warp,
-};
-
-const ADAPTIVE: Warp = Warp::Adaptive(Objective::Storage);
+use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Planner, Technique};
 
 fn plan(c: &mut Criterion) {
     let camera = Camera::look_at(LookAt {
@@ -25,30 +20,26 @@ fn plan(c: &mut Criterion) {
     let light = Light::Directional { direction: DVec3::new(-0.58, -0.71, -0.41) };
     let scene = Aabb::new(DVec3::new(-41.0, 0.0, -52.0), DVec3::new(41.0, 5.3, 52.0));
     let bounds = Bounds::of_scene(scene);
-    let one = Partition::default();
-    let four = Partition::slices(4);
-    let fitted = Partition { splits: Splits::Fitted, ..four };
-    let faces = Partition { faces: Faces::SidesAndNear, ..one };
     let mut group = c.benchmark_group("plan");
-    for (name, warp, partition) in [
-        ("uniform", Warp::Uniform, one),
-        ("psm", Warp::Psm, one),
-        ("lispsm", Warp::Lispsm, one),
-        ("tsm", Warp::Tsm { focus: None }, one),
-        ("adaptive", ADAPTIVE, one),
-        ("adaptive(area)", Warp::Adaptive(Objective::Area), one),
-        ("uniform+z4", Warp::Uniform, four),
-        ("lispsm+z4", Warp::Lispsm, four),
-        ("adaptive+z4", ADAPTIVE, four),
-        ("adaptive+z4(fitted)", ADAPTIVE, fitted),
-        ("adaptive+face", ADAPTIVE, faces),
-        ("stable+z4", Warp::Stable, four),
+    for text in [
+        "uniform",
+        "psm",
+        "lispsm",
+        "tsm",
+        "adaptive",
+        "adaptive(area)",
+        "uniform+z4",
+        "lispsm+z4",
+        "adaptive+z4",
+        "adaptive+z4(fitted)",
+        "adaptive+face",
+        "uniform(stable)+z4",
     ] {
-        let options = Options { warp, partition, ..Options::default() };
+        let technique: Technique = text.parse().expect("a technique");
         let mut planner = Planner::new();
-        group.bench_function(name, |b| {
+        group.bench_function(text, |b| {
             b.iter(|| {
-                planner.plan(black_box(&camera), &[light], &bounds, &options).unwrap().maps.len()
+                planner.plan(black_box(&camera), &[light], &bounds, &technique).unwrap().maps.len()
             });
         });
     }
@@ -63,8 +54,8 @@ fn plan(c: &mut Criterion) {
     let mut planner = Planner::new();
     group.bench_function("adaptive, 256 boxes of receivers", |b| {
         b.iter(|| {
-            let options = Options::default();
-            planner.plan(black_box(&camera), &[light], &bounds, &options).unwrap().maps.len()
+            let technique = Technique::default();
+            planner.plan(black_box(&camera), &[light], &bounds, &technique).unwrap().maps.len()
         });
     });
     group.finish();

@@ -88,7 +88,7 @@ pub struct Bounds<'a> {
     /// spare the maps what nobody sees: one for each object, say. Planning takes time in proportion.
     pub receiver_parts: &'a [Aabb],
     /// Everything that casts shadows; `None` if unknown: casters may lie anywhere towards the light.
-    /// Only [`Warp::Unfocused`](crate::Warp::Unfocused) and maps that [keep their casters' depths](crate::Options::keeps_casters)
+    /// Only [`Cover::Scene`](crate::Cover::Scene) and maps that [keep their casters' depths](crate::visibility::Filter::keeps_casters)
     /// have to cover it. Others need not: what lies between the receivers and the light is clamped to depth 0.
     pub casters: Option<Aabb>,
 }

@@ -13,7 +13,7 @@ pub(crate) struct Body {
     faces: Vec<Face>,
     /// Vertex indices of all faces, one loop after the other, counter-clockwise from outside.
     loops: Vec<u32>,
-    scratch: Scratch,
+    buffers: Buffers,
 }
 
 /// `loops[start..start + len]`, with the plane whose inside is the body's.
@@ -25,7 +25,7 @@ struct Face {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Scratch {
+struct Buffers {
     distances: Vec<f64>,
     /// Where kept vertices went; `u32::MAX` for those that no kept face has.
     moved: Vec<u32>,
@@ -175,8 +175,8 @@ impl Body {
         let scale = self.size();
         // Vertices this close to the plane count as on it: no slivers below rounding.
         let tolerance = 1e-13 * scale.max(plane.offset.abs());
-        let Scratch { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
-            &mut self.scratch;
+        let Buffers { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
+            &mut self.buffers;
         distances.clear();
         distances.extend(self.vertices.iter().map(|&v| {
             let d = plane.distance(v);

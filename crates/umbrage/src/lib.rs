@@ -35,17 +35,17 @@ mod bounds;
 mod camera;
 mod casters;
 mod error;
-mod fit;
 mod focus;
 mod light;
 mod math;
-mod options;
+mod matrices;
 mod partition;
 mod plan;
 mod planner;
 mod resolution;
 mod slab;
 mod stable;
+mod technique;
 pub mod theory;
 pub mod visibility;
 mod warp;
@@ -56,11 +56,12 @@ pub use bounds::{Aabb, Bounds, Plane};
 pub use camera::{Camera, ClipDepth, LookAt};
 pub use error::Error;
 pub use light::{Light, PointLight, SpotLight};
-pub use options::{Faces, Objective, Options, Partition, Size, Splits, Warp};
 pub use plan::{
     Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
 };
 pub use planner::Planner;
+pub use technique::language;
+pub use technique::{Cover, Faces, Limits, Objective, Partition, Size, Splits, Technique, Warp};
 
 /// The README's examples are tests.
 #[cfg(doctest)]

@@ -3,8 +3,8 @@
 use crate::bounds::Plane;
 use crate::camera::Camera;
 use crate::light::Lamp;
-use crate::options::{Partition, Splits};
 use crate::plan::Face;
+use crate::technique::{Partition, Splits};
 use glam::{DVec3, DVec4};
 
 /// The ends of slices; those beyond the last one are not used.

@@ -1,5 +1,6 @@
 use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
+use crate::visibility::Filter;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
 use std::ops::Range;
 
@@ -13,6 +14,11 @@ pub struct Plan {
     pub maps: Vec<ShadowMap>,
     /// What there is for each light, in their order.
     pub lights: Vec<PlannedLight>,
+    /// The filter that the maps are planned for: how far it reads beyond a map, and whether it asks
+    /// how far casters lie, decides which casters are drawn and where depths begin.
+    pub filter: Filter,
+    /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
+    pub pixel_gradient: DVec3,
 }
 
 /// One light's share of a [`Plan`].
@@ -75,6 +81,18 @@ impl Plan {
     /// error of 1 pixel per texel in s and in t (Lloyd et al. 2006, Eq. 12, whose images are square).
     pub fn storage_factor(&self) -> f64 {
         self.maps.iter().map(|m| m.storage_factor).sum()
+    }
+
+    /// A surface point with its plane, as one of the maps sees it. `world_normal` need not have unit
+    /// length and may point to either side. `None` as for [`ShadowMap::project`], on empty maps and
+    /// those that the plan does not have, and without a normal.
+    pub fn receiver(
+        &self,
+        map: usize,
+        world_position: DVec3,
+        world_normal: DVec3,
+    ) -> Option<Receiver> {
+        self.maps.get(map)?.receiver(world_position, world_normal, self.pixel_gradient)
     }
 
     /// The maps that answer for a world point under a light, and the share of each. There is one, two
@@ -191,8 +209,6 @@ pub struct ShadowMap {
     pub caster_planes: Vec<Plane>,
     /// Local position of a spot light, from which the map's beams come; `None`: beams are parallel.
     pub apex: Option<DVec3>,
-    /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
-    pub pixel_gradient: DVec3,
     /// Where the receivers served lie along the beams: [`Distances`](Slab::Distances) under lamps, else [`Leaning`](Slab::Leaning).
     pub slab: Slab,
 }
@@ -345,10 +361,13 @@ impl ShadowMap {
         Some(Beam { origin: near + self.origin, direction, reach_back })
     }
 
-    /// A surface point with its plane, as the map sees it. `world_normal` need not have unit length
-    /// and may point to either side. `None` as for [`project`](Self::project), on empty maps, and
-    /// without a normal.
-    pub fn receiver(&self, world_position: DVec3, world_normal: DVec3) -> Option<Receiver> {
+    /// See [`Plan::receiver`], and [`Plan::pixel_gradient`].
+    fn receiver(
+        &self,
+        world_position: DVec3,
+        world_normal: DVec3,
+        pixel_gradient: DVec3,
+    ) -> Option<Receiver> {
         let local = world_position - self.origin;
         let here = (!self.is_empty()).then(|| Local::at(self, local))??;
         let world_normal = world_normal.try_normalize()?;
@@ -374,7 +393,7 @@ impl ShadowMap {
                 let slant = slant.signum() * slant.abs().max(LEAST_SLANT);
                 let on_plane =
                     |gradient: DVec3| gradient - world_normal * (gradient.dot(view) / slant);
-                let pixel_metres = self.pixel_gradient.dot(local).max(0.0);
+                let pixel_metres = pixel_gradient.dot(local).max(0.0);
                 let across = |gradient| {
                     let gradient = on_plane(gradient);
                     (gradient - view * gradient.dot(view)) * pixel_metres

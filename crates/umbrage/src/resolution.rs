@@ -1,7 +1,7 @@
 //! How many texels each map gets.
 
 use crate::error::{Error, check};
-use crate::options::{Options, Size, Warp};
+use crate::technique::{Limits, Size, Technique};
 
 /// Ratios of a map's sides beyond this are cut.
 const MAX_RATIO: f64 = 1e9;
@@ -18,19 +18,20 @@ const MAX_RATIO: f64 = 1e9;
 /// A budget of less than the smallest possible size for each map; an error that needs sides longer than
 /// the device has.
 pub(crate) fn resolutions(
-    options: &Options,
+    technique: &Technique,
+    limits: Limits,
     units: &[[f64; 2]],
     sizes: &mut Vec<[u32; 2]>,
 ) -> Result<(), Error> {
     sizes.clear();
-    let limits = Limits::new(options);
-    match options.size {
+    let limits = Sides::new(technique, limits);
+    match technique.size {
         Size::Exact(size) => {
             sizes.extend(units.iter().map(|u| if is_empty(u) { [0; 2] } else { size }));
         }
         Size::Budget(texels) => {
             let least = (limits.least as u64).pow(2) * units.len() as u64;
-            check(texels >= least, "options.size", || {
+            check(texels >= least, "technique.size", || {
                 format!(
                     "a budget of {texels} texels is too small for {} maps, which need at least {least}",
                     units.len()
@@ -59,12 +60,17 @@ fn is_empty(unit: &[f64; 2]) -> bool {
 }
 
 /// `size` scaled up by `factor` each way, within what the device allows.
-pub(crate) fn enlarged(options: &Options, size: [u32; 2], factor: f64) -> Result<[u32; 2], Error> {
-    Limits::new(options).at_least(size.map(|n| f64::from(n) * factor), 1.0)
+pub(crate) fn enlarged(
+    technique: &Technique,
+    limits: Limits,
+    size: [u32; 2],
+    factor: f64,
+) -> Result<[u32; 2], Error> {
+    Sides::new(technique, limits).at_least(size.map(|n| f64::from(n) * factor), 1.0)
 }
 
 /// What sides a map may have, texels.
-struct Limits {
+struct Sides {
     /// Sides are multiples of this.
     align: f64,
     /// Of a side's texels, those that only leave room to move by whole texels.
@@ -73,15 +79,15 @@ struct Limits {
     most: f64,
 }
 
-impl Limits {
-    fn new(options: &Options) -> Self {
-        let align = f64::from(options.align);
-        let spare: f64 = if options.warp == Warp::Stable { 1.0 } else { 0.0 };
+impl Sides {
+    fn new(technique: &Technique, limits: Limits) -> Self {
+        let align = f64::from(limits.align);
+        let spare = f64::from(technique.cover.spare_texels());
         Self {
             align,
             spare,
             least: ((1.0 + spare) / align).ceil() * align,
-            most: (f64::from(options.max_side) / align).floor() * align,
+            most: (f64::from(limits.max_side) / align).floor() * align,
         }
     }
 
@@ -113,7 +119,7 @@ impl Limits {
             let side = u / error + self.spare;
             ((side / self.align).ceil() * self.align).max(self.least)
         });
-        check(sides.iter().all(|&n| n <= self.most), "options.size", || {
+        check(sides.iter().all(|&n| n <= self.most), "technique.size", || {
             format!(
                 "so small an error needs a map of {}x{} texels, and sides end at {}",
                 sides[0], sides[1], self.most
@@ -124,7 +130,7 @@ impl Limits {
 }
 
 /// The error that all maps have when `texels` are spread over them.
-fn common_error(limits: &Limits, units: &[[f64; 2]], texels: f64) -> f64 {
+fn common_error(limits: &Sides, units: &[[f64; 2]], texels: f64) -> f64 {
     let used = || units.iter().filter(|u| !is_empty(u));
     let total =
         |error: f64| used().map(|&u| limits.sides(u, error)).map(|[s, t]| s * t).sum::<f64>();

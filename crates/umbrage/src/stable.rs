@@ -1,16 +1,16 @@
-//! Maps that stand still in the world.
+//! Stable maps: their texels keep their places in the world.
 
 use crate::camera::Camera;
-use crate::fit::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::light::Lamp;
+use crate::matrices::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::plan::ShadowMap;
 use crate::slab::along_axis;
 use crate::warp::LightSpace;
 use glam::{DMat3, DVec3, DVec4};
 
-/// Where a map stands whose texels keep their places and their size, whatever the camera does.
+/// Where a stable map lies: its texels keep their places and their size, whatever the camera does.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Still {
+pub(crate) struct Stable {
     space: LightSpace,
     covers: Covers,
     unit_error: f64,
@@ -24,7 +24,7 @@ enum Covers {
     Pyramid { slope: f64, inverse_depths: [f64; 2] },
 }
 
-impl Still {
+impl Stable {
     /// Around the part of the view frustum from `near` to `far`; under a lamp around all it shines on.
     pub(crate) fn around(lamp: &Lamp, camera: &Camera, [near, far]: [f64; 2]) -> Self {
         let space = LightSpace::fixed(lamp, camera);
@@ -45,8 +45,9 @@ impl Still {
         [self.unit_error; 2]
     }
 
-    /// Sets a map's matrices, for the resolution it has.
-    pub(crate) fn place(&self, map: &mut ShadowMap) {
+    /// Sets a map's matrices, for the resolution it has. Gives how far before depth 0 the map has to
+    /// begin, as a share of its range of depths.
+    pub(crate) fn place(&self, map: &mut ShadowMap) -> f64 {
         let (middle, width, depth) = match self.covers {
             Covers::Pyramid { slope, inverse_depths: [far, near] } => {
                 let depth = DepthRange::around(far.midpoint(near), (near - far) / 2.0);
@@ -75,11 +76,15 @@ impl Still {
         [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &self.space);
         map.apex = self.space.apex;
         map.slab = along_axis(&self.space);
-        if let Covers::Pyramid { slope, inverse_depths: [far, near] } = self.covers {
-            // A texel there is 2 slope/res of the way to the lamp wide, and 1/depth grows by as much.
-            let shortest = map.resolution[0].min(map.resolution[1]);
-            let texel = 2.0 * slope / f64::from(shortest) * near;
-            map.begin_earlier(MARGIN_TEXELS * texel / (near - far));
+        match self.covers {
+            // A sphere's depths have their margin already.
+            Covers::Sphere { .. } => 0.0,
+            Covers::Pyramid { slope, inverse_depths: [far, near] } => {
+                // A texel there is 2 slope/res of the way to the lamp wide, and 1/depth grows by as much.
+                let shortest = map.resolution[0].min(map.resolution[1]);
+                let texel = 2.0 * slope / f64::from(shortest) * near;
+                MARGIN_TEXELS * texel / (near - far)
+            }
         }
     }
 }

@@ -75,7 +75,7 @@ impl Eq for Simplex {}
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch {
+pub(crate) struct Buffers {
     corners: Vec<Corner>,
     /// Simplices whose bound exceeds the best value known by more than the tolerance.
     open: BinaryHeap<Simplex>,
@@ -87,9 +87,9 @@ pub(crate) fn worst_errors(
     map: &ShadowMap,
     body: &Body,
     camera: &Camera,
-    scratch: &mut Scratch,
+    buffers: &mut Buffers,
 ) -> MapError {
-    let Scratch { corners, open } = scratch;
+    let Buffers { corners, open } = buffers;
     let probe = Probe { map, camera };
     corners.clear();
     corners.extend(body.vertices().iter().filter_map(|&v| probe.corner(v)));

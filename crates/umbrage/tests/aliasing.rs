@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{WARPS, config, options};
+use common::{WARPS, config, planner, technique};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
-use umbrage::{Planner, ShadowMap};
+use umbrage::ShadowMap;
 
 /// Where the beam through (s, row) meets the plane through `point`.
 fn meet(map: &ShadowMap, s: f64, row: f64, point: DVec3, normal: DVec3) -> Option<DVec3> {
@@ -25,12 +25,12 @@ proptest! {
         pick in 0..WARPS.len(),
         normal in common::direction(),
     ) {
-        let (name, warp) = WARPS[pick];
+        let (name, spread) = WARPS[pick];
         let camera = config.camera;
         // Differences of coordinates far from the origin have no digits left.
         prop_assume!(camera.eye().length() < 1e3 * camera.near().max(0.1));
-        let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &[config.light], &config.bounds, &options(warp)).unwrap();
+        let mut planner = planner();
+        let plan = planner.plan(&camera, &[config.light], &config.bounds, &technique(spread)).unwrap();
         for p in config.seen_points(&numbers) {
             let map = &plan.maps[plan.lookup(0, p).next().unwrap().0];
             let shadow = map.project(p).unwrap();
@@ -89,13 +89,14 @@ proptest! {
         pick in 0..WARPS.len(),
         normal in common::direction(),
     ) {
-        let (name, warp) = WARPS[pick];
+        let (name, spread) = WARPS[pick];
         prop_assume!(config.camera.eye().length() < 1e3 * config.camera.near().max(0.1));
-        let mut planner = Planner::new();
-        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
+        let mut planner = planner();
+        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique(spread)).unwrap();
         for p in config.seen_points(&[number]) {
-            let map = &plan.maps[plan.lookup(0, p).next().unwrap().0];
-            let receiver = map.receiver(p, normal).unwrap();
+            let (index, _) = plan.lookup(0, p).next().unwrap();
+            let map = &plan.maps[index];
+            let receiver = plan.receiver(index, p, normal).unwrap();
             let Some(q) = meet(map, receiver.st.x + 3e-3, map.rows.row_from_t(receiver.st.y) - 2e-3, p, normal) else {
                 continue;
             };
@@ -120,7 +121,7 @@ fn surfaces_edge_on_to_the_light_have_infinite_error() {
     })
     .unwrap();
     let light = umbrage::Light::Directional { direction: DVec3::NEG_Y };
-    let mut planner = Planner::new();
+    let mut planner = planner();
     let plan = planner.plan(&camera, &[light], &Default::default(), &Default::default()).unwrap();
     let map = &plan.maps[0];
     let wall = map.surface_error(&camera, DVec3::new(0.0, 0.0, -5.0), DVec3::Z).unwrap();

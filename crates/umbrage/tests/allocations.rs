@@ -6,8 +6,8 @@ use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use umbrage::{
-    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Planner, PointLight,
-    Size, Splits, SpotLight, Warp,
+    Aabb, Bounds, Camera, Faces, Light, LookAt, Partition, Planner, PointLight, Splits, SpotLight,
+    Technique,
 };
 
 struct Counting;
@@ -62,16 +62,9 @@ fn steady_frames_do_not_allocate() {
         }),
         Light::Point(PointLight { position: DVec3::new(3.0, 4.0, -2.0), near: 0.1, range: 30.0 }),
     ];
-    let warps = [
-        Warp::Unfocused,
-        Warp::Uniform,
-        Warp::Psm,
-        Warp::Lispsm,
-        Warp::Tsm { focus: None },
-        Warp::Adaptive(Objective::Storage),
-        Warp::Adaptive(Objective::Area),
-        Warp::Log,
-    ];
+    let texts =
+        ["unfocused", "uniform", "psm", "lispsm", "tsm", "adaptive", "adaptive(area)", "log"];
+    let technique = |text: &str| text.parse::<Technique>().unwrap();
     let four = Partition::slices(4);
     let partitions = [
         Partition::default(),
@@ -79,24 +72,26 @@ fn steady_frames_do_not_allocate() {
         Partition { splits: Splits::Fitted, ..four },
         Partition { faces: Faces::SidesAndNear, ..Partition::slices(2) },
     ];
-    let mut cases: Vec<(&[Light], Options)> = Vec::new();
-    for warp in warps {
+    let mut cases: Vec<(&[Light], Technique)> = Vec::new();
+    for text in texts {
         for partition in partitions {
             // Fitting all sides of a point light takes long.
             let count = if partition.splits == Splits::Fitted { 2 } else { 3 };
-            cases.push((&lights[..count], Options { warp, partition, ..Options::default() }));
+            cases.push((&lights[..count], Technique { partition, ..technique(text) }));
         }
     }
-    let stable = Options { warp: Warp::Stable, partition: partitions[1], ..Options::default() };
-    let by_error = Options { size: Size::MaxError(20.0), partition: four, ..Options::default() };
-    let soft =
-        Options { keeps_casters: true, reach_texels: 16, partition: four, ..Options::default() };
-    cases.extend([(&lights[..], stable), (&lights[..], by_error), (&lights[..], soft)]);
-    for (lights, options) in cases {
+    let lamps = &lights[1..];
+    cases.extend([
+        (&lights[..], technique("uniform(stable)+z4(overlap=0.2)")),
+        (&lights[..], technique("adaptive+z4@20px")),
+        (&lights[..1], technique("adaptive+z4:pcss")),
+        (lamps, technique("adaptive+z4:pcss(light=0.2m)")),
+    ]);
+    for (lights, technique) in cases {
         let mut planner = Planner::new();
         let mut orbit = || {
             for frame in 0..11 {
-                planner.plan(&camera(frame), lights, &bounds, &options).unwrap();
+                planner.plan(&camera(frame), lights, &bounds, &technique).unwrap();
             }
         };
         // Buffers change places: it takes a few rounds until all have grown.
@@ -105,6 +100,6 @@ fn steady_frames_do_not_allocate() {
         assert!(before > 0, "the counter counts");
         orbit();
         let after = ALLOCATIONS.with(Cell::get);
-        assert_eq!(after, before, "{options:?}, {} lights", lights.len());
+        assert_eq!(after, before, "{technique:?}, {} lights", lights.len());
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use umbrage::{
-    Atlas, AtlasTooLarge, Bounds, Camera, Light, LookAt, Options, Place, Plan, Planner, ShadowMap,
+    Atlas, AtlasTooLarge, Bounds, Camera, Light, LookAt, Place, Plan, Planner, ShadowMap, Technique,
 };
 
 /// Any map; only its resolution matters here.
@@ -20,7 +20,7 @@ fn map() -> ShadowMap {
     });
     let sun = Light::Directional { direction: DVec3::NEG_Y };
     let mut planner = Planner::new();
-    let plan = planner.plan(&camera.unwrap(), &[sun], &Bounds::default(), &Options::default());
+    let plan = planner.plan(&camera.unwrap(), &[sun], &Bounds::default(), &Technique::default());
     plan.unwrap().maps[0].clone()
 }
 
@@ -28,6 +28,43 @@ fn plan(resolutions: &[[u32; 2]]) -> Plan {
     let map = map();
     let maps = resolutions.iter().map(|&resolution| ShadowMap { resolution, ..map.clone() });
     Plan { maps: maps.collect(), ..Plan::default() }
+}
+
+/// The plan's maps as they are, with gutters of any width.
+fn packed(plan: &Plan, gutter: u32, max_side: u32) -> Result<Atlas, AtlasTooLarge> {
+    Atlas::packed_sizes(&resolutions(plan), gutter, max_side)
+}
+
+fn layered(plan: &Plan, gutter: u32, max_side: u32) -> Result<Atlas, AtlasTooLarge> {
+    Atlas::layered_sizes(&resolutions(plan), gutter, max_side)
+}
+
+fn resolutions(plan: &Plan) -> Vec<[u32; 2]> {
+    plan.maps.iter().map(|m| m.resolution).collect()
+}
+
+/// Gutters, and where maps begin, follow from the filter that a plan is for.
+#[test]
+fn an_atlas_leaves_what_the_plans_filter_reads() {
+    let sizes = [[100, 201], [31, 77], [0, 0], [65, 33]];
+    for (text, gutter, align) in [
+        ("hard", 0, 1),
+        ("pcf5", 3, 1),
+        ("pcss", 16, 1),
+        ("vsm(blur=7)", 4, 1),
+        ("vsm(blur=2px)", 32, 32),
+    ] {
+        let plan = Plan { filter: text.parse().unwrap(), ..plan(&sizes) };
+        for atlas in [Atlas::packed(&plan, 8192).unwrap(), Atlas::layered(&plan, 8192).unwrap()] {
+            assert_eq!(atlas.gutter_texels, gutter, "{text}");
+            if align == 1 {
+                check(&atlas, &plan, gutter, 8192).unwrap();
+            }
+            for place in atlas.places.iter().flatten() {
+                assert!(place.origin.iter().all(|n| n % align == 0), "{text}: {place:?}");
+            }
+        }
+    }
 }
 
 /// Corners of a place with its gutter: smallest and largest.
@@ -121,7 +158,7 @@ proptest! {
         max_side in prop_oneof![Just(2048u32), Just(8192), Just(65536)],
     ) {
         let plan = plan(&resolutions);
-        for atlas in [Atlas::packed(&plan, gutter, max_side), Atlas::layered(&plan, gutter, max_side)] {
+        for atlas in [packed(&plan, gutter, max_side), layered(&plan, gutter, max_side)] {
             let fits = resolutions.iter().all(|r| r[0].max(r[1]) + 2 * gutter <= max_side);
             match atlas {
                 Ok(atlas) => check(&atlas, &plan, gutter, max_side)?,
@@ -134,7 +171,7 @@ proptest! {
                 }
             }
         }
-        prop_assert_eq!(Atlas::packed(&plan, gutter, max_side), Atlas::packed(&plan, gutter, max_side));
+        prop_assert_eq!(packed(&plan, gutter, max_side), packed(&plan, gutter, max_side));
     }
 
     /// No single map wastes anything, and the layers are as large as they have to be.
@@ -143,8 +180,8 @@ proptest! {
         prop_assume!(size[0] > 0);
         let plan = plan(&[size]);
         let expected = size.map(|n| n + 2 * gutter);
-        prop_assert_eq!(Atlas::packed(&plan, gutter, 1 << 16).unwrap().size, expected);
-        prop_assert_eq!(Atlas::layered(&plan, gutter, 1 << 16).unwrap().size, expected);
+        prop_assert_eq!(packed(&plan, gutter, 1 << 16).unwrap().size, expected);
+        prop_assert_eq!(layered(&plan, gutter, 1 << 16).unwrap().size, expected);
     }
 }
 
@@ -158,7 +195,7 @@ fn little_room_is_wasted() {
     for _ in 0..plans {
         let resolutions = shares().new_tree(&mut runner).unwrap().current();
         let plan = plan(&resolutions);
-        let atlas = Atlas::packed(&plan, 2, 16384).unwrap();
+        let atlas = packed(&plan, 2, 16384).unwrap();
         check(&atlas, &plan, 2, 16384).unwrap();
         let fill = fill(&atlas, &plan);
         sum += fill;
@@ -172,13 +209,13 @@ fn little_room_is_wasted() {
 #[test]
 fn equal_maps_leave_no_gap() {
     for (n, sizes) in [(4, [[2, 2]; 2]), (6, [[3, 2], [2, 3]]), (16, [[4, 4]; 2])] {
-        let atlas = Atlas::packed(&plan(&vec![[508; 2]; n]), 2, 8192).unwrap();
+        let atlas = packed(&plan(&vec![[508; 2]; n]), 2, 8192).unwrap();
         assert!(sizes.map(|s| s.map(|k| k * 512)).contains(&atlas.size), "{n}: {:?}", atlas.size);
     }
     // And they fill a texture to its last texel.
     let full = plan(&[[8192; 2]; 4]);
-    assert_eq!(Atlas::packed(&full, 0, 16384).unwrap().size, [16384; 2]);
-    let error = Atlas::packed(&full, 1, 16384).unwrap_err();
+    assert_eq!(packed(&full, 0, 16384).unwrap().size, [16384; 2]);
+    let error = packed(&full, 1, 16384).unwrap_err();
     assert_eq!(error, AtlasTooLarge { maps: 4, texels: 4 * 8194 * 8194, max_side: 16384 });
     assert_eq!(
         error.to_string(),
@@ -189,37 +226,37 @@ fn equal_maps_leave_no_gap() {
 #[test]
 fn extremes() {
     let nothing = plan(&[]);
-    assert_eq!(Atlas::packed(&nothing, 3, 8192).unwrap().size, [0, 0]);
-    assert_eq!(Atlas::layered(&nothing, 3, 8192).unwrap().layers, 0);
+    assert_eq!(packed(&nothing, 3, 8192).unwrap().size, [0, 0]);
+    assert_eq!(layered(&nothing, 3, 8192).unwrap().layers, 0);
 
     let empty = plan(&[[0, 0], [0, 0]]);
-    assert_eq!(Atlas::packed(&empty, 3, 0).unwrap().places, [None, None]);
-    let layered = Atlas::layered(&empty, 3, 8192).unwrap();
-    assert_eq!((layered.size, layered.layers), ([0, 0], 2));
+    assert_eq!(packed(&empty, 3, 0).unwrap().places, [None, None]);
+    let empty_layers = layered(&empty, 3, 8192).unwrap();
+    assert_eq!((empty_layers.size, empty_layers.layers), ([0, 0], 2));
 
     let tiny = plan(&(0..5000).map(|i| [1 + i % 3, 1 + i % 5]).collect::<Vec<_>>());
-    let atlas = Atlas::packed(&tiny, 1, 8192).unwrap();
+    let atlas = packed(&tiny, 1, 8192).unwrap();
     check(&atlas, &tiny, 1, 8192).unwrap();
     assert!(fill(&atlas, &tiny) > 0.95, "{}", fill(&atlas, &tiny));
 
     // A giant among dwarfs, and strips both ways.
     let mixed = plan(&[[16000, 16000], [1, 1], [16384, 1], [1, 16384], [0, 0], [300, 20]]);
-    let atlas = Atlas::packed(&mixed, 0, 16385).unwrap();
+    let atlas = packed(&mixed, 0, 16385).unwrap();
     check(&atlas, &mixed, 0, 16385).unwrap();
 
     for (gutter, max_side) in [(u32::MAX, 8192), (u32::MAX, u32::MAX), (0, 63), (0, 0), (1, 65)] {
         let one = plan(&[[64, 64]]);
-        let error = Atlas::packed(&one, gutter, max_side).unwrap_err();
+        let error = packed(&one, gutter, max_side).unwrap_err();
         assert_eq!((error.maps, error.max_side), (1, max_side));
-        assert_eq!(Atlas::layered(&one, gutter, max_side).unwrap_err(), error);
+        assert_eq!(layered(&one, gutter, max_side).unwrap_err(), error);
     }
-    assert_eq!(Atlas::packed(&plan(&[[64, 64]]), 7, u32::MAX).unwrap().size, [78, 78]);
+    assert_eq!(packed(&plan(&[[64, 64]]), 7, u32::MAX).unwrap().size, [78, 78]);
 }
 
 /// Empty maps take no place in an atlas and keep theirs among the layers.
 #[test]
 fn layers_do_not_move() {
-    let atlas = Atlas::layered(&plan(&[[100, 30], [0, 0], [20, 50]]), 4, 8192).unwrap();
+    let atlas = layered(&plan(&[[100, 30], [0, 0], [20, 50]]), 4, 8192).unwrap();
     assert_eq!((atlas.size, atlas.layers), ([108, 58], 3));
     let layers: Vec<_> = atlas.places.iter().map(|p| p.map(|p| (p.layer, p.origin))).collect();
     assert_eq!(layers, [Some((0, [4, 4])), None, Some((2, [4, 4]))]);

@@ -2,12 +2,15 @@
 
 mod common;
 
-use common::{Config, WARPS, config, direction, map_count, options, partition, possible};
+use common::{
+    Config, STABLE, WARPS, config, direction, map_count, partition, planner, possible, technique,
+};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use std::cell::Cell;
+use umbrage::visibility::{Filter, LightSize, Pattern, Width};
 use umbrage::{
-    Aabb, Bounds, Camera, Light, LookAt, Objective, Options, Partition, Planner, SpotLight, Warp,
+    Aabb, Bounds, Camera, Light, LookAt, Objective, Partition, SpotLight, Technique, Warp,
 };
 
 /// Where the way from `p` to the light ends, in lengths of the vector given; parallel light's goes on.
@@ -74,16 +77,16 @@ fn whatever_is_hit_may_cast() {
     let count = |cell: &Cell<u64>, n: u64| cell.set(cell.get() + n);
     runner
         .run(&input, |(config, partition, numbers, things, pick)| {
-            let (name, warp) = WARPS[pick];
-            let partition = possible(partition, warp);
-            let options = Options { partition, ..options(warp) };
+            let (name, spread) = WARPS[pick];
+            let partition = possible(partition, spread);
+            let technique = Technique { partition, ..technique(spread) };
             // Millions of boxes are enough.
             prop_assume!(
                 map_count(&partition, &config.light) <= 100 && config.corners().len() >= 4
             );
-            let mut planner = Planner::new();
+            let mut planner = planner();
             let plan =
-                planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+                planner.plan(&config.camera, &[config.light], &config.bounds, &technique).unwrap();
             let receivers = config.seen_points(&numbers);
             let (middle, size) = seen(&config);
             for (i, (place, shape, scale, is_triangle)) in things.into_iter().enumerate() {
@@ -164,15 +167,17 @@ fn casters_keep_their_depths_if_asked() {
     };
     // The second lamp hangs amid the casters: those next to it are flattened.
     let sun = Light::Directional { direction: DVec3::new(0.5, -1.0, 0.2) };
-    for warp in [Warp::Uniform, Warp::Lispsm, Warp::Psm, Warp::Stable] {
+    for spread in [Warp::Uniform.into(), Warp::Lispsm.into(), Warp::Psm.into(), STABLE] {
         for (index, light) in [sun, spot(60.0), spot(30.0)].into_iter().enumerate() {
-            let mut planner = Planner::new();
-            let mut nearest = |keeps_casters| {
+            let is_sun = matches!(light, Light::Directional { .. });
+            let size = if is_sun { LightSize::Degrees(0.5) } else { LightSize::Metres(0.2) };
+            let mut planner = planner();
+            let mut nearest = |filter| {
                 let partition = Partition::slices(2);
-                let options = Options { warp, keeps_casters, partition, ..Options::default() };
-                let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap().clone();
-                let again = planner.plan(&camera, &[light], &bounds, &options).unwrap();
-                assert!(plan == *again, "{warp:?} {index}: a frame depends on the one before");
+                let technique = Technique { filter, partition, ..technique(spread) };
+                let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap().clone();
+                let again = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
+                assert!(plan == *again, "{spread:?} {index}: a frame depends on the one before");
                 let mut nearest = f64::INFINITY;
                 for map in plan.maps.iter().filter(|m| !m.is_empty()) {
                     for i in 0..9000 {
@@ -192,15 +197,18 @@ fn casters_keep_their_depths_if_asked() {
                 }
                 nearest
             };
-            let [kept, flat] = [nearest(true), nearest(false)];
-            // All that a still lamp shines on lies in its depths anyway.
-            let flattens = warp != Warp::Stable || index == 0;
-            assert!(kept >= -1e-9 && (flat < -0.4 || !flattens), "{warp:?} {index}: {kept} {flat}");
+            let [kept, flat] = [Filter::Pcss { n: 4, light: size }, Filter::Hard].map(&mut nearest);
+            // All that a stable map's lamp shines on lies in its depths anyway.
+            let flattens = spread != STABLE || index == 0;
+            assert!(
+                kept >= -1e-9 && (flat < -0.4 || !flattens),
+                "{spread:?} {index}: {kept} {flat}"
+            );
         }
     }
 }
 
-/// What casts only into the gutter that filters look into counts as a caster if their reach is told.
+/// What casts only into the gutter that a plan's filter reads counts as a caster.
 #[test]
 fn casters_beside_a_map_count_as_far_as_filters_reach() {
     let camera = camera(60.0);
@@ -208,10 +216,10 @@ fn casters_beside_a_map_count_as_far_as_filters_reach() {
     let floor = Aabb::new(DVec3::new(-10.0, 0.0, -40.0), DVec3::new(10.0, 0.1, 10.0));
     let bounds = Bounds { receivers: Some(floor), casters: None, receiver_parts: &[] };
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage)] {
-        let mut planner = Planner::new();
-        let mut misses = |reach_texels| {
-            let options = Options { warp, reach_texels, ..Options::default() };
-            let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
+        let mut planner = planner();
+        let mut misses = |filter| {
+            let technique = Technique { warp, filter, ..Technique::default() };
+            let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
             let map = &plan.maps[0];
             let texel = DVec2::from(map.resolution.map(f64::from)).recip();
             let (mut served, mut missed) = (0, 0);
@@ -235,7 +243,8 @@ fn casters_beside_a_map_count_as_far_as_filters_reach() {
             assert!(served > 1000, "{warp:?}: {served}");
             missed
         };
-        let [told, untold] = [misses(16), misses(0)];
+        let wide = Filter::Spread { n: 3, width: Width::Metres(1.0), pattern: Pattern::Grid };
+        let [told, untold] = [wide, Filter::Hard].map(&mut misses);
         assert!(told == 0 && untold > 0, "{warp:?}: {told} {untold}");
     }
 }

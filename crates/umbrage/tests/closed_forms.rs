@@ -1,7 +1,7 @@
 //! Measured errors of planned maps against the papers' closed forms.
 
 use glam::DVec3;
-use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Plan, Planner, Size, Warp};
+use umbrage::{Bounds, Camera, Light, LookAt, Objective, Plan, Planner, Size, Technique, Warp};
 
 const N: f64 = 1.0;
 const F: f64 = 100.0;
@@ -29,9 +29,9 @@ fn sun(theta: f64) -> Light {
 }
 
 fn plan_view(camera: &Camera, theta: f64, warp: Warp) -> Plan {
-    let options = Options { warp, size: Size::Exact(RES), max_side: 4096, ..Options::default() };
+    let technique = Technique { warp, size: Size::Exact(RES), ..Technique::default() };
     let mut planner = Planner::new();
-    planner.plan(camera, &[sun(theta)], &Bounds::default(), &options).unwrap().clone()
+    planner.plan(camera, &[sun(theta)], &Bounds::default(), &technique).unwrap().clone()
 }
 
 fn assert_close(measured: f64, expected: f64, tolerance: f64, what: &str) {

@@ -2,11 +2,12 @@
 
 mod common;
 
-use common::{WARPS, map_count, options, possible};
+use common::{STABLE, WARPS, map_count, planner, possible, technique};
 use glam::{DMat4, DVec2, DVec3, DVec4};
+use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
-    Aabb, Bounds, Camera, ClipDepth, Error, Faces, Light, LookAt, Options, Partition, Plan,
-    Planner, PointLight, Size, Splits, SpotLight, Warp,
+    Aabb, Bounds, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt, Partition, Plan,
+    Planner, PointLight, Size, Splits, SpotLight, Technique, Warp,
 };
 
 const VIEW: LookAt = LookAt {
@@ -70,7 +71,7 @@ fn lights_and_bounds_name_what_is_wrong() {
     let camera = Camera::look_at(VIEW).unwrap();
     let plan = |light: Light, bounds: &Bounds| {
         // The first light is fine.
-        field(Planner::new().plan(&camera, &[SUN, light], bounds, &Options::default()))
+        field(planner().plan(&camera, &[SUN, light], bounds, &Technique::default()))
     };
     let none = Bounds::default();
     for direction in [DVec3::ZERO, DVec3::NAN, DVec3::new(0.0, f64::INFINITY, 0.0)] {
@@ -109,80 +110,125 @@ fn lights_and_bounds_name_what_is_wrong() {
 }
 
 #[test]
-fn options_name_what_is_wrong() {
+fn techniques_name_what_is_wrong() {
     let camera = Camera::look_at(VIEW).unwrap();
-    let some = Options::default();
+    let some = Technique::default();
     let four = Partition::slices(4);
     let (nan, inf) = (f64::NAN, f64::INFINITY);
     let at = |ends: &[f64]| {
         let mut all = [nan; Partition::MAX_SLICES - 1];
         all[..ends.len()].copy_from_slice(ends);
-        Options { partition: Partition { splits: Splits::At(all), ..four }, ..some }
+        Technique { partition: Partition { splits: Splits::At(all), ..four }, ..some }
     };
-    let practical = |blend| Options {
+    let practical = |blend| Technique {
         partition: Partition { splits: Splits::Practical(blend), ..four },
         ..some
     };
-    let overlap = |overlap| Options { partition: Partition { overlap, ..four }, ..some };
-    let slices = |slices| Options { partition: Partition { slices, ..four }, ..some };
-    let stable = |partition| Options { warp: Warp::Stable, partition, ..some };
-    let size = |size| Options { size, ..some };
+    let overlap = |overlap| Technique { partition: Partition { overlap, ..four }, ..some };
+    let slices = |slices| Technique { partition: Partition { slices, ..four }, ..some };
+    let stable = |partition| Technique { partition, ..technique(STABLE) };
+    let pcss = |light| Technique { filter: Filter::Pcss { n: 4, light }, ..some };
+    let size = |size| Technique { size, ..some };
     let cases = [
-        (size(Size::Budget(0)), "options.size"),
-        (size(Size::Budget((1 << 32) + 1)), "options.size"),
-        (size(Size::Exact([0, 5])), "options.size"),
-        (size(Size::Exact([5, 9000])), "options.size"),
-        (Options { align: 4, ..size(Size::Exact([6, 8])) }, "options.size"),
-        (size(Size::MaxError(0.0)), "options.size"),
-        (size(Size::MaxError(-1.0)), "options.size"),
-        (size(Size::MaxError(nan)), "options.size"),
-        (size(Size::MaxError(inf)), "options.size"),
-        (Options { max_side: 0, ..some }, "options.max_side"),
-        (Options { max_side: 65537, ..some }, "options.max_side"),
-        (Options { align: 0, ..some }, "options.align"),
-        (Options { align: 8193, ..some }, "options.align"),
-        (Options { warp: Warp::Lambda(0.0), ..some }, "options.warp.lambda"),
-        (Options { warp: Warp::Lambda(nan), ..some }, "options.warp.lambda"),
-        (Options { warp: Warp::Tsm { focus: Some(-1.0) }, ..some }, "options.warp.focus"),
-        (Options { warp: Warp::Tsm { focus: Some(inf) }, ..some }, "options.warp.focus"),
-        (slices(0), "options.partition.slices"),
-        (slices(17), "options.partition.slices"),
-        (overlap(-0.1), "options.partition.overlap"),
-        (overlap(1.1), "options.partition.overlap"),
-        (overlap(nan), "options.partition.overlap"),
-        (practical(-0.1), "options.partition.splits"),
-        (practical(1.1), "options.partition.splits"),
-        (practical(nan), "options.partition.splits"),
-        (at(&[1.0, 2.0]), "options.partition.splits"),
-        (at(&[1.0, 2.0, 2.0]), "options.partition.splits"),
-        (at(&[3.0, 2.0, 4.0]), "options.partition.splits"),
-        (at(&[0.0, 2.0, 4.0]), "options.partition.splits"),
-        (at(&[-1.0, 2.0, 4.0]), "options.partition.splits"),
-        (at(&[1.0, 2.0, inf]), "options.partition.splits"),
-        (stable(Partition { faces: Faces::Sides, ..four }), "options.partition.faces"),
-        (stable(Partition { splits: Splits::Fitted, ..four }), "options.partition.splits"),
-        (Options { size: Size::Exact([1, 64]), ..stable(four) }, "options.size"),
-        (Options { max_side: 1, ..stable(four) }, "options.size"),
+        (size(Size::Budget(0)), "technique.size"),
+        (size(Size::Budget((1 << 32) + 1)), "technique.size"),
+        (size(Size::Exact([0, 5])), "technique.size"),
+        (size(Size::Exact([5, 9000])), "technique.size"),
+        (size(Size::MaxError(0.0)), "technique.size"),
+        (size(Size::MaxError(-1.0)), "technique.size"),
+        (size(Size::MaxError(nan)), "technique.size"),
+        (size(Size::MaxError(inf)), "technique.size"),
+        (Technique { warp: Warp::Lambda(0.0), ..some }, "technique.warp.lambda"),
+        (Technique { warp: Warp::Lambda(nan), ..some }, "technique.warp.lambda"),
+        (Technique { warp: Warp::Tsm { focus: Some(-1.0) }, ..some }, "technique.warp.focus"),
+        (Technique { warp: Warp::Tsm { focus: Some(inf) }, ..some }, "technique.warp.focus"),
+        (slices(0), "technique.partition.slices"),
+        (slices(17), "technique.partition.slices"),
+        (overlap(-0.1), "technique.partition.overlap"),
+        (overlap(1.1), "technique.partition.overlap"),
+        (overlap(nan), "technique.partition.overlap"),
+        (practical(-0.1), "technique.partition.splits"),
+        (practical(1.1), "technique.partition.splits"),
+        (practical(nan), "technique.partition.splits"),
+        (at(&[1.0, 2.0]), "technique.partition.splits"),
+        (at(&[1.0, 2.0, 2.0]), "technique.partition.splits"),
+        (at(&[3.0, 2.0, 4.0]), "technique.partition.splits"),
+        (at(&[0.0, 2.0, 4.0]), "technique.partition.splits"),
+        (at(&[-1.0, 2.0, 4.0]), "technique.partition.splits"),
+        (at(&[1.0, 2.0, inf]), "technique.partition.splits"),
+        (stable(Partition { faces: Faces::Sides, ..four }), "technique.partition.faces"),
+        (stable(Partition { splits: Splits::Fitted, ..four }), "technique.partition.splits"),
+        (Technique { size: Size::Exact([1, 64]), ..stable(four) }, "technique.size"),
+        (Technique { warp: Warp::Lispsm, ..stable(four) }, "technique.cover"),
+        (Technique { cover: Cover::Scene, ..some }, "technique.cover"),
+        (Technique { filter: Filter::Pcf { n: 0 }, ..some }, "filter.n"),
+        (pcss(LightSize::Degrees(91.0)), "filter.light"),
     ];
-    for (options, expected) in cases {
-        let result = Planner::new().plan(&camera, &[SUN], &Bounds::default(), &options).cloned();
-        assert_eq!(field(result), expected, "{options:?}");
+    for (technique, expected) in cases {
+        let result = planner().plan(&camera, &[SUN], &Bounds::default(), &technique).cloned();
+        assert_eq!(field(result), expected, "{technique:?}");
         // No light, no excuse.
-        let result = Planner::new().plan(&camera, &[], &Bounds::default(), &options).cloned();
-        assert_eq!(field(result), expected, "{options:?}");
+        let result = planner().plan(&camera, &[], &Bounds::default(), &technique).cloned();
+        assert_eq!(field(result), expected, "{technique:?}");
     }
     // What is not used may be anything.
-    Planner::new().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
+    planner().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
+}
+
+#[test]
+fn limits_name_what_is_wrong() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let plan = |limits, technique: &Technique| {
+        let mut planner = Planner::with_limits(limits);
+        field(planner.plan(&camera, &[SUN], &Bounds::default(), technique).cloned())
+    };
+    let limits = |max_side, align| Limits { max_side, align };
+    let any = Technique::default();
+    for (max_side, align, expected) in [
+        (0, 1, "limits.max_side"),
+        (65537, 1, "limits.max_side"),
+        (8192, 0, "limits.align"),
+        (8192, 8193, "limits.align"),
+    ] {
+        assert_eq!(plan(limits(max_side, align), &any), expected);
+    }
+    let exact = Technique { size: Size::Exact([6, 8]), ..any };
+    assert_eq!(plan(limits(8192, 4), &exact), "technique.size");
+    assert_eq!(plan(limits(1, 1), &technique(STABLE)), "technique.size");
+}
+
+/// A sun's size is an angle, a lamp's a length; what does not go together is an error, not a guess.
+#[test]
+fn lights_sizes_are_of_the_lights_kind() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let lamp = Light::Point(PointLight { position: DVec3::ZERO, near: 0.1, range: 50.0 });
+    for (light, size, is_right) in [
+        (SUN, LightSize::Degrees(0.5), true),
+        (SUN, LightSize::Metres(0.5), false),
+        (lamp, LightSize::Degrees(0.5), false),
+        (lamp, LightSize::Metres(0.5), true),
+    ] {
+        let filter = Filter::Pcss { n: 4, light: size };
+        let technique = Technique { filter, ..Technique::default() };
+        let result = planner().plan(&camera, &[light], &Bounds::default(), &technique).cloned();
+        match result {
+            Ok(plan) => assert!(is_right && plan.filter == filter),
+            error => {
+                assert!(!is_right);
+                assert_eq!(field(error), "technique.filter.light");
+            }
+        }
+    }
 }
 
 #[test]
 fn no_lights_need_no_maps() {
     let camera = Camera::look_at(VIEW).unwrap();
-    let mut planner = Planner::new();
-    planner.plan(&camera, &[SUN], &Bounds::default(), &Options::default()).unwrap();
+    let mut planner = planner();
+    planner.plan(&camera, &[SUN], &Bounds::default(), &Technique::default()).unwrap();
     for size in [Size::Budget(1), Size::Exact([8, 8]), Size::MaxError(1e-9)] {
-        let options = Options { size, ..Options::default() };
-        let plan = planner.plan(&camera, &[], &Bounds::default(), &options).unwrap();
+        let technique = Technique { size, ..Technique::default() };
+        let plan = planner.plan(&camera, &[], &Bounds::default(), &technique).unwrap();
         assert!(plan.maps.is_empty() && plan.lights.is_empty());
         assert_eq!((plan.texels(), plan.storage_factor()), (0, 0.0));
         assert_eq!(plan.lookup(0, VIEW.target).count(), 0);
@@ -248,24 +294,24 @@ fn odd_input_gives_sound_plans() {
         Size::MaxError(3.0),
         Size::MaxError(1e6),
     ];
-    let mut planner = Planner::new();
+    let mut planner = planner();
     // Every pair of a partition and a size in turn, for each warp.
     let mut turn = 0;
     for look in views {
         let camera = Camera::look_at(look).unwrap();
         for light in lights {
             for bounds in worlds {
-                for (name, warp) in WARPS {
+                for (name, spread) in WARPS {
                     turn += 1;
                     for step in 0..2 {
-                        let partition = possible(partitions[(turn + step) % 7], warp);
+                        let partition = possible(partitions[(turn + step) % 7], spread);
                         let size = sizes[(turn + 2 * step) % 5];
-                        let options = Options { size, partition, ..options(warp) };
-                        let what = format!("{name} {options:?} {look:?} {light:?} {bounds:?}");
+                        let technique = Technique { size, partition, ..technique(spread) };
+                        let what = format!("{name} {technique:?} {look:?} {light:?} {bounds:?}");
                         let maps = map_count(&partition, &light);
-                        let least = if warp == Warp::Stable { 4 } else { 1 };
+                        let least = if spread == STABLE { 4 } else { 1 };
                         let is_too_small = size == Size::Budget(1) && maps * least > 1;
-                        match planner.plan(&camera, &[light], &bounds, &options) {
+                        match planner.plan(&camera, &[light], &bounds, &technique) {
                             Ok(plan) => {
                                 assert_eq!(plan.maps.len(), maps, "{what}");
                                 assert!(!is_too_small, "{what}");
@@ -282,7 +328,7 @@ fn odd_input_gives_sound_plans() {
                                     is_too_small || matches!(size, Size::MaxError(_)),
                                     "{what}: {result:?}"
                                 );
-                                assert_eq!(field(result), "options.size");
+                                assert_eq!(field(result), "technique.size");
                             }
                         }
                     }
@@ -322,10 +368,10 @@ fn check_sound(plan: &Plan, size: Size, what: &str) {
 fn a_camera_that_sees_nothing_gets_an_empty_plan() {
     let camera = Camera::look_at(VIEW).unwrap();
     let behind = Aabb::new(DVec3::new(-50.0, 0.0, 50.0), DVec3::new(-40.0, 10.0, 60.0));
-    for (name, warp) in WARPS {
-        let mut planner = Planner::new();
+    for (name, spread) in WARPS {
+        let mut planner = planner();
         let plan =
-            planner.plan(&camera, &[SUN], &Bounds::of_scene(behind), &options(warp)).unwrap();
+            planner.plan(&camera, &[SUN], &Bounds::of_scene(behind), &technique(spread)).unwrap();
         assert!(plan.maps.iter().all(umbrage::ShadowMap::is_empty), "{name}");
         assert_eq!((plan.texels(), plan.storage_factor()), (0, 0.0));
         assert!(plan.maps[0].footprint(VIEW.target).is_none());
@@ -437,13 +483,13 @@ fn landmarks() {
     let level = LookAt { eye: DVec3::ZERO, target: DVec3::NEG_Z, ..VIEW };
     let camera = Camera::look_at(level).unwrap();
     let light = Light::Directional { direction: DVec3::NEG_Y };
-    for (name, warp) in WARPS {
-        let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &[light], &Bounds::default(), &options(warp)).unwrap();
+    for (name, spread) in WARPS {
+        let mut planner = planner();
+        let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique(spread)).unwrap();
         let map = &plan.maps[0];
         let at = |x: f64, y: f64, z: f64| map.project(DVec3::new(x, y, z)).unwrap();
-        // Nor does a map that stands still follow the view.
-        if !matches!(warp, Warp::Unfocused | Warp::Stable) {
+        // Maps over other than what is seen do not follow the view.
+        if spread.cover == Cover::Seen {
             assert!(at(0.0, 0.0, -0.1).y.abs() < 1e-9, "{name}: near");
             assert!((at(0.0, 0.0, -100.0).y - 1.0).abs() < 1e-9, "{name}: far");
             assert!(at(0.0, 0.0, -3.0).y > at(0.0, 0.0, -2.0).y, "{name}");
@@ -475,9 +521,10 @@ fn casters_are_culled() {
         range: 400.0,
     });
     for light in [sun, spot] {
-        for (name, warp) in WARPS {
-            let mut planner = Planner::new();
-            let plan = planner.plan(&camera, &[light], &Bounds::default(), &options(warp)).unwrap();
+        for (name, spread) in WARPS {
+            let mut planner = planner();
+            let plan =
+                planner.plan(&camera, &[light], &Bounds::default(), &technique(spread)).unwrap();
             let map = &plan.maps[0];
             for (center, casts) in [
                 (DVec3::new(0.0, 0.0, -50.0), true),
@@ -500,9 +547,9 @@ fn single_precision_is_enough_far_from_the_origin() {
     let far_away = DVec3::new(1e5, 0.0, -1e5);
     let look = LookAt { eye: VIEW.eye + far_away, target: VIEW.target + far_away, ..VIEW };
     let camera = Camera::look_at(look).unwrap();
-    for (name, warp) in WARPS {
-        let mut planner = Planner::new();
-        let plan = planner.plan(&camera, &[SUN], &Bounds::default(), &options(warp)).unwrap();
+    for (name, spread) in WARPS {
+        let mut planner = planner();
+        let plan = planner.plan(&camera, &[SUN], &Bounds::default(), &technique(spread)).unwrap();
         let map = &plan.maps[0];
         for depth in [0.2, 1.0, 10.0, 90.0] {
             for pixel in

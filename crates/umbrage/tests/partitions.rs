@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::{Config, camera, config, direction, options, point_in_view};
+use common::{Config, camera, config, direction, planner, point_in_view, technique};
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Bounds, Camera, Face, Faces, Light, LookAt, Objective, Options, Partition, Planner, PointLight,
-    ShadowMap, Splits, Warp,
+    Bounds, Camera, Face, Faces, Light, LookAt, Objective, Partition, Planner, PointLight,
+    ShadowMap, Splits, Technique, Warp,
 };
 
 /// W&P's reference view: n = 1, f = 1000, φ = 30°, square.
@@ -38,15 +38,15 @@ const ADAPTIVE: Warp = Warp::Adaptive(Objective::Storage);
 
 fn storage(planner: &mut Planner, light: Light, warp: Warp, slices: u32, faces: Faces) -> f64 {
     let partition = Partition { faces, ..Partition::slices(slices) };
-    let options = Options { partition, ..options(warp) };
-    let plan = planner.plan(&reference_view(), &[light], &Bounds::default(), &options);
+    let technique = Technique { partition, ..technique(warp) };
+    let plan = planner.plan(&reference_view(), &[light], &Bounds::default(), &technique);
     plan.unwrap().storage_factor()
 }
 
 /// The reference figures, for k = 1, 2, 4, 8, 16 slices, from the errors of whole plans.
 #[test]
 fn storage_factors_of_the_paper() {
-    let planner = &mut Planner::new();
+    let planner = &mut planner();
     let columns: [(&str, Light, Warp, Faces, [f64; 5]); 5] = [
         (
             "ZP overhead",
@@ -89,7 +89,7 @@ fn storage_factors_of_the_paper() {
 /// behind (W&P §5.3).
 #[test]
 fn no_light_direction_is_much_worse_than_light_from_behind() {
-    let mut planner = Planner::new();
+    let mut planner = planner();
     for k in [1, 2, 4, 8, 16] {
         for (name, warp, faces) in [
             ("ZP", Warp::Uniform, Faces::Whole),
@@ -207,11 +207,11 @@ proptest! {
         // World coordinates far away have no digits left for what is tested here.
         prop_assume!(camera.eye().length() < 1e3 * camera.near());
         let faces = if with_near { Faces::SidesAndNear } else { Faces::Sides };
-        let options = Options {
+        let technique = Technique {
             partition: Partition { faces, ..Partition::slices(slices) },
-            ..options(Warp::Uniform)
+            ..technique(Warp::Uniform)
         };
-        let mut planner = Planner::new();
+        let mut planner = planner();
         for (is_lamp, l) in awkward_lights(&camera, random, place) {
             let light = if is_lamp {
                 let (near, range) = (camera.near() * 1e-9, camera.far() * 10.0);
@@ -219,7 +219,7 @@ proptest! {
             } else {
                 Light::Directional { direction: -l }
             };
-            let plan = planner.plan(&camera, &[light], &Bounds::default(), &options).unwrap();
+            let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique).unwrap();
             let config = Config { camera, light, bounds: Bounds::default() };
             let along_view = camera.forward().dot(l);
             // The near face is a front face of lamps behind the eye and a back face of those beyond it.
@@ -289,11 +289,11 @@ proptest! {
         let n = depths.iter().copied().fold(f64::INFINITY, f64::min);
         let f = depths.iter().copied().fold(0.0, f64::max);
         let at = std::array::from_fn(|i| n * (first + 0.2 * i as f64));
-        let mut planner = Planner::new();
+        let mut planner = planner();
         let mut expect = |splits, end: &dyn Fn(f64, f64, f64, usize) -> f64| {
             let partition = Partition { splits, ..Partition::slices(slices) };
-            let options = Options { partition, ..options(Warp::Uniform) };
-            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+            let technique = Technique { partition, ..technique(Warp::Uniform) };
+            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique).unwrap();
             let found: Vec<_> = plan.maps.iter().map(|m| m.split).collect();
             let ([first, _], [_, last]) = (found[0], found[found.len() - 1]);
             // Bounds that are flat were widened a little, and a view along them sees much of it.
@@ -323,11 +323,11 @@ proptest! {
         slices in 2..=8u32,
         faces in prop_oneof![2 => Just(Faces::Whole), 1 => Just(Faces::SidesAndNear)],
     ) {
-        let mut planner = Planner::new();
+        let mut planner = planner();
         for warp in [Warp::Uniform, Warp::Lispsm, ADAPTIVE, Warp::Log] {
             let partition = Partition { splits: Splits::Fitted, faces, ..Partition::slices(slices) };
-            let options = Options { partition, ..options(warp) };
-            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+            let technique = Technique { partition, ..technique(warp) };
+            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique).unwrap();
             for maps in plan.maps.chunks(slices as usize) {
                 let storages = maps.iter().map(|m| m.storage_factor).filter(|&s| s > 0.0);
                 let (lo, hi) = storages.fold((f64::INFINITY, 0f64), |(lo, hi), s| (lo.min(s), hi.max(s)));
@@ -349,13 +349,13 @@ proptest! {
 fn a_lamp_in_the_eye() {
     let camera = reference_view();
     let light = Light::Point(PointLight { position: camera.eye(), near: 1e-3, range: 1e4 });
-    let mut planner = Planner::new();
+    let mut planner = planner();
     for (faces, served) in
         [(Faces::Whole, true), (Faces::SidesAndNear, true), (Faces::Sides, false)]
     {
         let partition = Partition { faces, ..Partition::slices(2) };
-        let options = Options { partition, ..options(ADAPTIVE) };
-        let plan = planner.plan(&camera, &[light], &Bounds::default(), &options).unwrap();
+        let technique = Technique { partition, ..technique(ADAPTIVE) };
+        let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique).unwrap();
         for z in [0.01, 0.5, 0.99] {
             let p = point_in_view(&camera, [0.3, 0.6, z]);
             assert_eq!(plan.lookup(0, p).count(), usize::from(served), "{faces:?} at {p}");

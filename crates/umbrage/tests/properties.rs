@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::{WARPS, config, map_count, options, partition, possible};
+use common::{WARPS, config, map_count, partition, planner, possible, technique};
 use proptest::prelude::*;
-use umbrage::{Aabb, Light, Objective, Options, Planner, Warp};
+use umbrage::{Aabb, Light, Objective, Technique, Warp};
 
 fn numbers() -> impl Strategy<Value = Vec<[f64; 3]>> {
     proptest::collection::vec([0.0..=1.0f64, 0.0..=1.0, 0.0..=1.0], 24)
@@ -22,11 +22,11 @@ proptest! {
         numbers in numbers(),
         pick in 0..WARPS.len(),
     ) {
-        let (name, warp) = WARPS[pick];
-        let mut planner = Planner::new();
-        let partition = possible(partition, warp);
-        let options = Options { partition, ..options(warp) };
-        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options).unwrap();
+        let (name, spread) = WARPS[pick];
+        let mut planner = planner();
+        let partition = possible(partition, spread);
+        let technique = Technique { partition, ..technique(spread) };
+        let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique).unwrap();
         let name = format!("{name} {partition:?}");
         let maps = map_count(&partition, &config.light);
         prop_assert_eq!((plan.maps.len(), plan.lights[0].maps.clone()), (maps, 0..maps));
@@ -90,9 +90,9 @@ proptest! {
     /// `adaptive` needs no more texels than `uniform` for the same error, however little warping helps.
     #[test]
     fn uniform_needs_at_least_adaptive(config in config()) {
-        let mut planner = Planner::new();
+        let mut planner = planner();
         let mut storage = |warp| {
-            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &options(warp)).unwrap();
+            let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique(warp)).unwrap();
             plan.storage_factor()
         };
         let uniform = storage(Warp::Uniform);
@@ -117,10 +117,10 @@ fn maxima_are_reached() {
         .run(&suns, |config| {
             let corners = config.corners();
             prop_assume!(corners.len() >= 4);
-            let mut planner = Planner::new();
-            for (name, warp) in WARPS {
+            let mut planner = planner();
+            for (name, spread) in WARPS {
                 let plan = planner
-                    .plan(&config.camera, &[config.light], &config.bounds, &options(warp))
+                    .plan(&config.camera, &[config.light], &config.bounds, &technique(spread))
                     .unwrap();
                 let map = &plan.maps[0];
                 prop_assert!(!map.is_empty());

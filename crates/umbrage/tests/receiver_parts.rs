@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::{Config, WARPS, config, options, partition, possible};
+use common::{Config, WARPS, config, partition, planner, possible, technique};
 use glam::DVec3;
 use proptest::prelude::*;
-use umbrage::{Aabb, Bounds, Faces, Light, Options, Partition, Plan, Planner, Splits, Warp};
+use umbrage::{Aabb, Bounds, Faces, Light, Partition, Plan, Splits, Technique, Warp};
 
 /// Some boxes among a configuration's receivers, or in its view where there are none: some flat, some
 /// empty, some twice, some out of sight. They are given by numbers, for any configuration.
@@ -71,8 +71,8 @@ fn seen_points(config: &Config, parts: &[Aabb], numbers: &[[f64; 3]]) -> Vec<DVe
     points.filter(|&p| config.sees(p)).collect()
 }
 
-fn plan(config: &Config, bounds: &Bounds<'_>, options: &Options) -> Plan {
-    Planner::new().plan(&config.camera, &[config.light], bounds, options).unwrap().clone()
+fn plan(config: &Config, bounds: &Bounds<'_>, technique: &Technique) -> Plan {
+    planner().plan(&config.camera, &[config.light], bounds, technique).unwrap().clone()
 }
 
 fn under_a_sun() -> impl Strategy<Value = Config> {
@@ -96,11 +96,11 @@ proptest! {
         numbers in prop::collection::vec(prop::array::uniform3(0.0..=1.0f64), 4),
         pick in 0..WARPS.len(),
     ) {
-        let (name, warp) = WARPS[pick];
-        let partition = possible(partition, warp);
+        let (name, spread) = WARPS[pick];
+        let partition = possible(partition, spread);
         let parts = parts(&config, &boxes);
         let bounds = Bounds { receiver_parts: &parts, ..config.bounds };
-        let plan = plan(&config, &bounds, &Options { partition, ..options(warp) });
+        let plan = plan(&config, &bounds, &Technique { partition, ..technique(spread) });
         for map in &plan.maps {
             let errors = [map.error.max_s, map.error.max_t, map.error.max];
             prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite());
@@ -152,7 +152,7 @@ proptest! {
         let all = parts.iter().filter(|p| !p.is_empty()).fold(Aabb::EMPTY, |all, p| all.union(*p));
         let all = config.bounds.receivers.map_or(all, |r| r.intersection(all));
         prop_assume!(!all.is_empty());
-        let storage = |bounds: Bounds<'_>| plan(&config, &bounds, &options(Warp::Uniform)).storage_factor();
+        let storage = |bounds: Bounds<'_>| plan(&config, &bounds, &technique(Warp::Uniform)).storage_factor();
         let one = storage(Bounds { receivers: Some(all), ..config.bounds });
         let many = storage(Bounds { receiver_parts: &parts, ..config.bounds });
         prop_assert!(many <= one * 1.01, "{many} > {one}");
@@ -167,12 +167,12 @@ proptest! {
         pick in 0..WARPS.len(),
         larger in prop_oneof![Just(0.0), Just(10.0), Just(1e9)],
     ) {
-        let (name, warp) = WARPS[pick];
+        let (name, spread) = WARPS[pick];
         // Rounding decides where a search for fitted slices ends, and the range on a face where light and
         // view nearly agree.
         prop_assume!(partition.splits != Splits::Fitted);
-        let partition = Partition { faces: Faces::Whole, ..possible(partition, warp) };
-        let options = Options { partition, ..options(warp) };
+        let partition = Partition { faces: Faces::Whole, ..possible(partition, spread) };
+        let technique = Technique { partition, ..technique(spread) };
         let far = config.camera.far();
         let around_view = Aabb::new(config.camera.eye() - 9.0 * far, config.camera.eye() + 9.0 * far);
         let all = config.bounds.receivers.unwrap_or(around_view);
@@ -180,9 +180,9 @@ proptest! {
         let is_flat = all.size().min_element() == 0.0;
         let larger = if is_flat { f64::max(larger, 1.0) } else { larger };
         let part = [Aabb { min: all.min - larger, max: all.max + larger }];
-        let expected = plan(&config, &config.bounds, &options);
-        let found = plan(&config, &Bounds { receiver_parts: &part, ..config.bounds }, &options);
-        let tolerance = match warp {
+        let expected = plan(&config, &config.bounds, &technique);
+        let found = plan(&config, &Bounds { receiver_parts: &part, ..config.bounds }, &technique);
+        let tolerance = match spread.warp {
             // Its strength is somewhere on a valley's flat bottom.
             Warp::Adaptive(_) => 1e-5,
             // Multiplies roundings where near and far hardly differ.

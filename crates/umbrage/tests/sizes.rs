@@ -2,12 +2,15 @@
 
 mod common;
 
-use common::{Config, WARPS, camera, config, direction, options, partition, possible};
+use common::{
+    Config, STABLE, Spread, WARPS, camera, config, direction, partition, planner, possible,
+    technique,
+};
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Bounds, Camera, Error, Faces, Light, LookAt, Objective, Options, Partition, Plan, Planner,
-    PointLight, ShadowMap, Size, Splits, Warp,
+    Bounds, Camera, Error, Faces, Light, Limits, LookAt, Objective, Partition, Plan, Planner,
+    PointLight, ShadowMap, Size, Splits, Technique, Warp,
 };
 
 /// Warps under which the largest errors are known exactly.
@@ -24,8 +27,15 @@ fn suns() -> impl Strategy<Value = (Config, Vec<Light>)> {
     })
 }
 
-fn plan(config: &Config, lights: &[Light], options: &Options) -> Plan {
-    Planner::new().plan(&config.camera, lights, &config.bounds, options).unwrap().clone()
+fn plan(config: &Config, lights: &[Light], technique: &Technique) -> Plan {
+    plan_within(Limits { max_side: 1 << 16, ..Limits::default() }, config, lights, technique)
+}
+
+fn plan_within(limits: Limits, config: &Config, lights: &[Light], technique: &Technique) -> Plan {
+    Planner::with_limits(limits)
+        .plan(&config.camera, lights, &config.bounds, technique)
+        .unwrap()
+        .clone()
 }
 
 fn maps(plan: &Plan) -> impl Iterator<Item = &ShadowMap> {
@@ -58,9 +68,9 @@ proptest! {
         budget in 22..=28u32,
     ) {
         let budget = 1u64 << budget;
-        let options = Options { size: Size::Budget(budget), partition, ..options(EXACT[pick]) };
-        let plan = plan(&config, &lights, &options);
-        let (lo, hi) = spread(&plan, options.max_side, 100);
+        let technique = Technique { size: Size::Budget(budget), partition, ..technique(EXACT[pick]) };
+        let plan = plan(&config, &lights, &technique);
+        let (lo, hi) = spread(&plan, 1 << 16, 100);
         // A texel more or less on a side of a hundred, and what that leaves to the other side.
         prop_assert!(hi <= lo * 1.021 || hi == 0.0, "{lo} to {hi}");
         prop_assert!(plan.texels() <= budget);
@@ -80,8 +90,8 @@ proptest! {
     ) {
         let budget = 1u64 << budget;
         let size = Size::Budget(budget);
-        let options = Options { size, partition, max_side, align, ..options(EXACT[pick]) };
-        let plan = plan(&config, &lights, &options);
+        let technique = Technique { size, partition, ..technique(EXACT[pick]) };
+        let plan = plan_within(Limits { max_side, align }, &config, &lights, &technique);
         prop_assert!(plan.texels() <= budget);
         let longest = max_side / align * align;
         for map in maps(&plan) {
@@ -105,12 +115,12 @@ proptest! {
         pick in 0..WARPS.len(),
         budget in 18..=22u32,
     ) {
-        let warp = WARPS[pick].1;
-        let partition = possible(partition, warp);
+        let spread = WARPS[pick].1;
+        let partition = possible(partition, spread);
         let largest = |plan: &Plan| maps(plan).map(|m| m.error.max).fold(0.0, f64::max);
         let with = |size| {
-            let options = Options { partition, size, ..options(warp) };
-            Planner::new().plan(&config.camera, &[config.light], &config.bounds, &options).cloned()
+            let technique = Technique { partition, size, ..technique(spread) };
+            planner().plan(&config.camera, &[config.light], &config.bounds, &technique).cloned()
         };
         let Ok(by_budget) = with(Size::Budget(1 << budget)) else { return Ok(()) };
         let wanted = largest(&by_budget) * 1.0001;
@@ -120,7 +130,7 @@ proptest! {
                 prop_assert!(largest(&by_error) <= wanted * (1.0 + 1e-9));
                 let is_fine = maps(&by_error).all(|m| m.resolution.iter().all(|&n| n >= 40));
                 // Stable maps are sized for the worst that they may ever see.
-                if is_fine && warp != Warp::Stable {
+                if is_fine && spread != STABLE {
                     let fewer = with(Size::Budget((by_error.texels() as f64 * 0.8) as u64)).unwrap();
                     prop_assert!(largest(&fewer) > wanted, "{} of {wanted}", largest(&fewer));
                 }
@@ -128,7 +138,7 @@ proptest! {
             Err(error) => {
                 // A side was cut.
                 let is_cut = |m: &ShadowMap| m.resolution.iter().any(|&n| n > 20_000);
-                prop_assert!(warp == Warp::Stable || maps(&by_budget).any(is_cut), "{error}");
+                prop_assert!(spread == STABLE || maps(&by_budget).any(is_cut), "{error}");
             }
         }
     }
@@ -140,16 +150,16 @@ proptest! {
         (one, other) in (partition(), partition()),
         (pick, other_pick) in (0..WARPS.len(), 0..WARPS.len()),
     ) {
-        let options = |partition, pick: usize| {
-            let warp = WARPS[pick].1;
-            Options { partition: possible(partition, warp), ..common::options(warp) }
+        let technique = |partition, pick: usize| {
+            let spread = WARPS[pick].1;
+            Technique { partition: possible(partition, spread), ..common::technique(spread) }
         };
-        let (a, b) = (options(one, pick), options(other, other_pick));
+        let (a, b) = (technique(one, pick), technique(other, other_pick));
         let fresh = plan(&first, &[first.light], &a);
-        let mut planner = Planner::new();
+        let mut planner = planner();
         let lights = [second.light, first.light];
         planner.plan(&second.camera, &lights, &second.bounds, &b).unwrap();
-        let too_small = Options { size: Size::MaxError(1e-12), ..b };
+        let too_small = Technique { size: Size::MaxError(1e-12), ..b };
         let _ = planner.plan(&second.camera, &lights, &second.bounds, &too_small);
         let broken = [second.light, Light::Directional { direction: DVec3::ZERO }];
         planner.plan(&second.camera, &broken, &second.bounds, &b).unwrap_err();
@@ -168,11 +178,11 @@ proptest! {
         let lights: Vec<Light> =
             directions.into_iter().map(|direction| Light::Directional { direction }).collect();
         let size = Size::Exact([64, 32]);
-        let options = Options { partition, size, ..options(Warp::Lispsm) };
+        let technique = Technique { partition, size, ..technique(Warp::Lispsm) };
         let config = Config { camera, light: lights[0], bounds: Bounds::default() };
-        let together = plan(&config, &lights, &options);
+        let together = plan(&config, &lights, &technique);
         for (i, (&light, planned)) in lights.iter().zip(&together.lights).enumerate() {
-            let mut alone = plan(&config, &[light], &options);
+            let mut alone = plan(&config, &[light], &technique);
             alone.maps.iter_mut().for_each(|m| m.part.light = i);
             prop_assert_eq!(&together.maps[planned.maps.clone()], &alone.maps[..]);
             prop_assert_eq!(planned.theta_rad, alone.lights[0].theta_rad);
@@ -201,27 +211,27 @@ fn sizes_that_cannot_be_had() {
     let lamp = Light::Point(PointLight { position: DVec3::ZERO, near: 0.1, range: 50.0 });
     let slices = |k| Partition::slices(k);
     let faces = Partition { faces: Faces::SidesAndNear, ..slices(3) };
-    let cases: [(&[Light], Partition, Warp, Size, bool); 14] = [
-        (&[SUN], slices(4), Warp::Uniform, Size::Budget(3), false),
-        (&[SUN], slices(4), Warp::Uniform, Size::Budget(4), true),
-        (&[SUN, SUN], slices(4), Warp::Uniform, Size::Budget(7), false),
-        (&[SUN, SUN], slices(4), Warp::Uniform, Size::Budget(8), true),
-        (&[SUN], faces, Warp::Lispsm, Size::Budget(12), false),
-        (&[SUN], faces, Warp::Lispsm, Size::Budget(13), true),
-        (&[lamp], slices(2), Warp::Lispsm, Size::Budget(11), false),
-        (&[lamp], slices(2), Warp::Lispsm, Size::Budget(12), true),
-        (&[SUN], slices(4), Warp::Stable, Size::Budget(15), false),
-        (&[SUN], slices(4), Warp::Stable, Size::Budget(16), true),
-        (&[SUN], slices(1), Warp::Uniform, Size::MaxError(1e-9), false),
-        (&[SUN], slices(16), Warp::Uniform, Size::MaxError(1e-9), false),
-        (&[lamp], slices(1), Warp::Lispsm, Size::MaxError(1e-9), false),
-        (&[SUN], slices(4), Warp::Lispsm, Size::MaxError(1e9), true),
+    let cases: [(&[Light], Partition, Spread, Size, bool); 14] = [
+        (&[SUN], slices(4), Warp::Uniform.into(), Size::Budget(3), false),
+        (&[SUN], slices(4), Warp::Uniform.into(), Size::Budget(4), true),
+        (&[SUN, SUN], slices(4), Warp::Uniform.into(), Size::Budget(7), false),
+        (&[SUN, SUN], slices(4), Warp::Uniform.into(), Size::Budget(8), true),
+        (&[SUN], faces, Warp::Lispsm.into(), Size::Budget(12), false),
+        (&[SUN], faces, Warp::Lispsm.into(), Size::Budget(13), true),
+        (&[lamp], slices(2), Warp::Lispsm.into(), Size::Budget(11), false),
+        (&[lamp], slices(2), Warp::Lispsm.into(), Size::Budget(12), true),
+        (&[SUN], slices(4), STABLE, Size::Budget(15), false),
+        (&[SUN], slices(4), STABLE, Size::Budget(16), true),
+        (&[SUN], slices(1), Warp::Uniform.into(), Size::MaxError(1e-9), false),
+        (&[SUN], slices(16), Warp::Uniform.into(), Size::MaxError(1e-9), false),
+        (&[lamp], slices(1), Warp::Lispsm.into(), Size::MaxError(1e-9), false),
+        (&[SUN], slices(4), Warp::Lispsm.into(), Size::MaxError(1e9), true),
     ];
-    let mut planner = Planner::new();
-    for (lights, partition, warp, size, can_be) in cases {
-        let options = Options { warp, partition, size, ..Options::default() };
-        let what = format!("{partition:?} {warp:?} {size:?}");
-        match planner.plan(&view(), lights, &Bounds::default(), &options) {
+    let mut planner = planner();
+    for (lights, partition, spread, size, can_be) in cases {
+        let technique = Technique { partition, size, ..common::technique(spread) };
+        let what = format!("{partition:?} {spread:?} {size:?}");
+        match planner.plan(&view(), lights, &Bounds::default(), &technique) {
             Ok(plan) => {
                 assert!(can_be, "{what}");
                 let texels = plan.texels();
@@ -232,7 +242,7 @@ fn sizes_that_cannot_be_had() {
             }
             Err(Error::Invalid { field, problem }) => {
                 assert!(
-                    !can_be && field == "options.size" && !problem.is_empty(),
+                    !can_be && field == "technique.size" && !problem.is_empty(),
                     "{what}: {field}"
                 );
             }
@@ -245,9 +255,9 @@ fn sizes_that_cannot_be_had() {
 #[test]
 fn fitted_slices_share_evenly() {
     let partition = Partition { splits: Splits::Fitted, ..Partition::slices(4) };
-    let options = Options { partition, ..Options::default() };
-    let mut planner = Planner::new();
-    let plan = planner.plan(&view(), &[SUN], &Bounds::default(), &options).unwrap();
+    let technique = Technique { partition, ..Technique::default() };
+    let mut planner = planner();
+    let plan = planner.plan(&view(), &[SUN], &Bounds::default(), &technique).unwrap();
     for map in &plan.maps {
         let share = map.texels() as f64 / plan.texels() as f64;
         assert!((share - 0.25).abs() < 0.01, "{share}");

@@ -5,12 +5,12 @@
 
 mod common;
 
-use common::{Config, WARPS, config, direction, options, possible};
+use common::{Config, STABLE, Spread, WARPS, config, direction, planner, possible, technique};
 use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Face, Faces, Light, LookAt, Objective, Options, Partition, Plan, Planner,
-    ShadowMap, Size, Splits, Warp,
+    Aabb, Bounds, Camera, Face, Faces, Light, LookAt, Objective, Partition, Plan, ShadowMap, Size,
+    Splits, Technique, Warp,
 };
 
 struct Frame {
@@ -123,22 +123,23 @@ fn camera(frame: &Frame) -> Camera {
     .unwrap()
 }
 
-fn assert_smooth(steps: u32, partition: Partition, warps: &[(&str, Warp)]) {
-    let mut planner = Planner::new();
+fn assert_smooth(steps: u32, partition: Partition, spreads: &[(&str, Spread)]) {
+    let mut planner = planner();
     for (motion, frame_at) in MOTIONS {
         for (bounds_name, bounds) in bounds() {
-            for &(name, warp) in warps {
+            for &(name, spread) in spreads {
                 // For thin slices of a floor the least error of `adaptive` has two valleys now and then,
                 // and the lower one changes.
                 let is_thin = partition.slices > 1 && bounds_name == "floor";
-                if is_thin && matches!(warp, Warp::Adaptive(_)) {
+                if is_thin && matches!(spread.warp, Warp::Adaptive(_)) {
                     continue;
                 }
-                let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+                let technique =
+                    Technique { size: Size::Exact([1024; 2]), partition, ..technique(spread) };
                 let (jump, at) = largest_jump(steps, |t| {
                     let frame = frame_at(t);
                     let light = Light::Directional { direction: frame.sun };
-                    texels(planner.plan(&camera(&frame), &[light], &bounds, &options).unwrap())
+                    texels(planner.plan(&camera(&frame), &[light], &bounds, &technique).unwrap())
                 });
                 assert!(
                     jump == 0.0,
@@ -165,7 +166,7 @@ fn texels_of_slices_change_size_without_jumps() {
 fn texels_of_fitted_slices_change_size_without_jumps() {
     let fitted = Partition { splits: Splits::Fitted, ..Partition::slices(4) };
     let warps = [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage)];
-    assert_smooth(40, fitted, &warps.map(|warp| ("fitted", warp)));
+    assert_smooth(40, fitted, &warps.map(|warp| ("fitted", warp.into())));
 }
 
 /// Maps of faces change from front to back faces of the view where the light passes at right angles:
@@ -175,22 +176,23 @@ fn texels_of_fitted_slices_change_size_without_jumps() {
 fn faces_jump_at_right_angles_only() {
     let camera = camera(&Frame { eye: EYE, target: TARGET, sun: DVec3::ZERO });
     let (forward, up, right) = (camera.forward(), camera.up(), camera.right());
-    let mut planner = Planner::new();
+    let mut planner = planner();
     for side in [0.0, 0.06, 0.5, 2.0] {
-        for (name, warp) in WARPS {
+        for (name, spread) in WARPS {
             for (bounds_name, bounds) in bounds() {
                 let partition = Partition { faces: Faces::Sides, ..Partition::slices(2) };
-                let is_thin = matches!(warp, Warp::Adaptive(_)) && bounds_name == "floor";
-                if warp == Warp::Stable || is_thin {
+                let is_thin = matches!(spread.warp, Warp::Adaptive(_)) && bounds_name == "floor";
+                if spread == STABLE || is_thin {
                     continue;
                 }
-                let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+                let technique =
+                    Technique { size: Size::Exact([1024; 2]), partition, ..technique(spread) };
                 // From behind over the head to the front, from 0 to 1.
                 let mut plan = |t: f64| {
                     let (sin, cos) = (std::f64::consts::PI * t).sin_cos();
                     let direction = forward * cos - up * sin + right * (side * sin);
                     let light = Light::Directional { direction };
-                    planner.plan(&camera, &[light], &bounds, &options).unwrap().clone()
+                    planner.plan(&camera, &[light], &bounds, &technique).unwrap().clone()
                 };
                 let right_angle = 0.5;
                 for (from, to) in [(1e-3, right_angle - 1e-9), (right_angle + 1e-9, 1.0 - 1e-3)] {
@@ -263,11 +265,11 @@ proptest! {
     ) {
         // Far from the world's origin so small a motion is lost in rounding.
         prop_assume!(config.camera.eye().length() < 1e3);
-        let (name, warp) = WARPS[pick];
-        let partition = possible(Partition { faces, ..Partition::slices(slices) }, warp);
-        let options = Options { size: Size::Exact([1024; 2]), partition, ..options(warp) };
+        let (name, spread) = WARPS[pick];
+        let partition = possible(Partition { faces, ..Partition::slices(slices) }, spread);
+        let technique = Technique { size: Size::Exact([1024; 2]), partition, ..technique(spread) };
         let plan = |camera, light| {
-            Planner::new().plan(&camera, &[light], &config.bounds, &options).unwrap().clone()
+            planner().plan(&camera, &[light], &config.bounds, &technique).unwrap().clone()
         };
         let (camera, light) = moved(&config, which, step, axis);
         let (before, after) = (plan(config.camera, config.light), plan(camera, light));

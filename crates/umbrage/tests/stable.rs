@@ -3,12 +3,12 @@
 
 mod common;
 
-use common::{direction, options, point_in_view};
+use common::{STABLE, direction, planner, point_in_view, technique};
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Light, LookAt, Options, Partition, Planner, PointLight, ShadowMap, Size,
-    Splits, SpotLight, Warp,
+    Aabb, Bounds, Camera, Light, LookAt, Partition, PointLight, ShadowMap, Size, Splits, SpotLight,
+    Technique,
 };
 
 /// A camera but for where it is.
@@ -126,18 +126,18 @@ proptest! {
         floor: bool,
         numbers in proptest::collection::vec([0.0..1.0f64, 0.0..1.0, 0.0..1.0], 6),
     ) {
-        let options = Options { partition, size, ..options(Warp::Stable) };
+        let technique = Technique { partition, size, ..technique(STABLE) };
         let light = Light::Directional { direction: sun };
         let ground = Aabb::new(home + DVec3::new(-200.0, -1.0, -200.0), home + DVec3::new(200.0, 3.0, 200.0));
         let bounds = if floor { Bounds::of_scene(ground) } else { Bounds::default() };
         let landmarks: Vec<DVec3> =
             numbers.iter().map(|&n| home + (DVec3::from(n) - 0.5) * lens.far).collect();
         let rounding = 4.0 * f64::EPSILON * (home.abs().max_element() + 300.0 + lens.far);
-        let mut planner = Planner::new();
+        let mut planner = planner();
         let mut references: Vec<Option<Reference>> = Vec::new();
         for pose in poses {
             let camera = lens.at(pose);
-            let plan = planner.plan(&camera, &[light], &bounds, &options).unwrap();
+            let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
             references.resize_with(plan.maps.len(), || None);
             for (map, reference) in plan.maps.iter().zip(&mut references) {
                 if map.is_empty() {
@@ -190,7 +190,7 @@ proptest! {
     ) {
         // A budget is shared among six sides and their slices.
         let size = if size == Size::Budget(5000) { Size::Budget(50_000) } else { size };
-        let options = Options { partition, size, ..options(Warp::Stable) };
+        let technique = Technique { partition, size, ..technique(STABLE) };
         let (position, near, range) = (home + DVec3::from(at) * 30.0, 0.1, 100.0);
         let light = if is_spot {
             Light::Spot(SpotLight { position, direction: towards, half_angle_rad: 0.6, near, range })
@@ -200,11 +200,11 @@ proptest! {
         let landmarks: Vec<DVec3> =
             numbers.iter().map(|&n| position + (DVec3::from(n) - 0.5) * 60.0).collect();
         let rounding = 8.0 * f64::EPSILON * (home.abs().max_element() + 100.0);
-        let mut planner = Planner::new();
+        let mut planner = planner();
         let mut references: Vec<Option<Reference>> = Vec::new();
         for pose in poses {
             let camera = lens.at(pose);
-            let plan = planner.plan(&camera, &[light], &Bounds::default(), &options).unwrap();
+            let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique).unwrap();
             references.resize_with(plan.maps.len(), || None);
             for (map, reference) in plan.maps.iter().zip(&mut references) {
                 if map.is_empty() {
@@ -244,8 +244,8 @@ fn slices_beyond_the_view_cost_nothing() {
         at[..splits.len()].copy_from_slice(splits);
         let partition =
             Partition { splits: Splits::At(at), ..Partition::slices(splits.len() as u32 + 1) };
-        let options = Options { partition, ..options(Warp::Stable) };
-        let plan = Planner::new().plan(&camera, &[light], bounds, &options).unwrap().clone();
+        let technique = Technique { partition, ..technique(STABLE) };
+        let plan = planner().plan(&camera, &[light], bounds, &technique).unwrap().clone();
         plan.maps.iter().map(ShadowMap::texels).collect::<Vec<_>>()
     };
     let all = Bounds::default();

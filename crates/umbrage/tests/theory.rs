@@ -9,7 +9,8 @@ use umbrage::theory::{
     storage_factor,
 };
 use umbrage::{
-    Bounds, Camera, Error, Faces, Light, LookAt, Objective, Options, Plan, Planner, Size, Warp,
+    Bounds, Camera, Error, Faces, Light, Limits, LookAt, Objective, Plan, Planner, Size, Technique,
+    Warp,
 };
 
 const STORAGE: Rule = Rule::Adaptive(Objective::Storage);
@@ -531,8 +532,9 @@ fn sun(theta: f64) -> Light {
     Light::Directional { direction: DVec3::new(0.0, -theta.sin(), theta.cos()) }
 }
 
-fn plan(camera: &Camera, theta: f64, options: &Options) -> Plan {
-    Planner::new().plan(camera, &[sun(theta)], &Bounds::default(), options).unwrap().clone()
+fn plan(camera: &Camera, theta: f64, technique: &Technique) -> Plan {
+    let mut planner = Planner::with_limits(Limits { max_side: 65536, ..Limits::default() });
+    planner.plan(camera, &[sun(theta)], &Bounds::default(), technique).unwrap().clone()
 }
 
 /// What the planner calls a rule; `None` for what it has no name for.
@@ -561,9 +563,8 @@ fn planned_maps_have_the_errors_of_the_theory() {
         for (degrees, rule) in (1..=90).flat_map(|d| RULES.map(|r| (d, r))) {
             let Some(warp) = planners(rule) else { continue };
             let theta = f64::from(degrees).to_radians();
-            let options =
-                Options { warp, size: Size::Exact(res), max_side: 4096, ..Options::default() };
-            let plan = plan(&camera, theta, &options);
+            let technique = Technique { warp, size: Size::Exact(res), ..Technique::default() };
+            let plan = plan(&camera, theta, &technique);
             let map = &plan.maps[0];
             let tilted = Tilted::new(view, theta).unwrap();
             let warped = tilted.warped(map.lambda.unwrap_or(f64::INFINITY)).unwrap();
@@ -628,7 +629,7 @@ fn planned_maps_have_the_lambda_of_the_theory() {
             if !is_the_rule {
                 continue;
             }
-            let plan = plan(&camera, theta, &Options { warp, ..Options::default() });
+            let plan = plan(&camera, theta, &Technique { warp, ..Technique::default() });
             // In 1/λ, where no warp is one of many.
             let found = plan.maps[0].lambda.map_or(0.0, |l| tilted.mu() / l);
             let expected = tilted.mu() / expected;
@@ -686,9 +687,8 @@ fn storage_of_partitions() {
                 let partition = umbrage::Partition::slices(k);
                 // So many texels that rounding to whole ones is no matter.
                 let size = Size::Budget(1 << 32);
-                let options =
-                    Options { warp, partition, size, max_side: 65536, ..Options::default() };
-                let planned = plan(&camera, theta, &options).storage_factor();
+                let technique = Technique { warp, partition, size, ..Technique::default() };
+                let planned = plan(&camera, theta, &technique).storage_factor();
                 let found = of(rule, k, Faces::Whole, LightFrom::Angle(theta));
                 close(found, planned, 1e-5, &format!("{rule:?} at {degrees}°, k = {k}, {view:?}"));
             }

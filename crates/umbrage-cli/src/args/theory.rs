@@ -1,10 +1,10 @@
 //! `umbrage theory`: its options.
 
-use crate::spec::{nearest, parse_warp};
 use crate::values;
 use anyhow::{Result, anyhow, bail, ensure};
 use clap::{Args, Subcommand};
 use glam::DVec3;
+use umbrage::language::nearest;
 use umbrage::theory::{LightFrom, Rule};
 use umbrage::{Partition, Warp};
 
@@ -251,7 +251,7 @@ fn rule(text: &str) -> Result<Rule> {
     if text == IN_RANGE {
         return Ok(Rule::LispsmInRange);
     }
-    match parse_warp(text)? {
+    match text.parse()? {
         Warp::Uniform => Ok(Rule::Uniform),
         Warp::Psm => Ok(Rule::Psm),
         Warp::Lispsm => Ok(Rule::Lispsm),
@@ -285,7 +285,7 @@ fn light(text: &str) -> Result<LightFrom> {
         (_, Ok(_)) => bail!("must be an angle of 0 to 180 degrees, or overhead, or behind"),
         (_, Err(_)) => bail!(
             "must be overhead, behind or an angle of 0 to 180 degrees: did you mean {}?",
-            nearest(text, &["overhead", "behind"])
+            nearest(text, ["overhead", "behind"])
         ),
     }
 }

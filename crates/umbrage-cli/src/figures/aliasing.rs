@@ -11,8 +11,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::f64::consts::FRAC_PI_6;
 use std::fmt::Write;
 use umbrage::theory::{Errors, Rule, Tilted, View, Warped};
-use umbrage::visibility::Filter;
-use umbrage::{Bounds, Camera, Light, LookAt, Objective, Options, Planner, Size, Warp};
+use umbrage::{Bounds, Camera, Light, LookAt, Objective, Planner, Size, Technique, Warp};
 use umbrage_measure::{Image, PngPixel, Rgb, grey, png};
 use umbrage_scene::Scene;
 use umbrage_trace::{Reference, Tracer, shade};
@@ -360,14 +359,14 @@ fn executed(
 ) -> Result<[Image<Rgb>; 2]> {
     let camera = measured::camera_of(view, SIDE)?;
     let light = Light::Directional { direction: from_before(theta_rad) };
-    let options = Options {
+    let technique = Technique {
         warp: Warp::Lambda(case.planned.lambda()),
         size: Size::Exact([SIDE; 2]),
-        ..Options::default()
+        ..Technique::default()
     };
     let mut planner = Planner::new();
-    let plan = planner.plan(&camera, &[light], &Bounds::default(), &options)?;
-    let reference = Reference::render(tracer, plan, Filter::Hard, &|_| {})?;
+    let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique)?;
+    let reference = Reference::render(tracer, plan, &|_| {})?;
 
     let map = &reference.depth_maps()[0];
     // What lies nearer to the light than V is at depth 0, empty texels at 1.

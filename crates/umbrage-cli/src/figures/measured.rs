@@ -5,7 +5,7 @@ use glam::DVec3;
 use umbrage::aliasing::PointError;
 use umbrage::theory::View;
 use umbrage::{
-    Bounds, Camera, Faces, Light, LookAt, Options, Partition, Plan, Planner, Size, Warp,
+    Bounds, Camera, Faces, Light, LookAt, Partition, Plan, Planner, Size, Technique, Warp,
 };
 
 /// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that of
@@ -43,14 +43,14 @@ pub(super) fn plan(
     slices: u32,
     faces: Faces,
 ) -> Result<Plan> {
-    let options = Options {
+    let technique = Technique {
         warp,
         partition: Partition { faces, ..Partition::slices(slices) },
         size: Size::Exact([1; 2]),
-        ..Options::default()
+        ..Technique::default()
     };
     let light = Light::Directional { direction };
-    Ok(Planner::new().plan(&camera(view)?, &[light], &Bounds::default(), &options)?.clone())
+    Ok(Planner::new().plan(&camera(view)?, &[light], &Bounds::default(), &technique)?.clone())
 }
 
 /// Perspective errors of a plan's first map in the middle of the view at a distance, pixels per texel.

@@ -2,7 +2,7 @@
 
 use super::aliasing::embedded;
 use crate::pixels::{self, Rows, Shadowed};
-use crate::spec::Technique;
+use crate::spec::Spec;
 use anyhow::Result;
 use std::fmt::Write;
 use umbrage::{Bounds, Camera, Light, LookAt};
@@ -39,9 +39,9 @@ impl<'a> Shot<'a> {
 
     /// What a technique, as on the command line, makes of it.
     pub(super) fn picture(&self, technique: &str) -> Result<Image<Rgb>> {
-        let technique: Technique = technique.parse()?;
-        let (plan, _) = pixels::plan(&technique, &self.camera, &self.light, &self.bounds)?;
-        let reference = Reference::render(self.tracer, &plan, technique.filter, &|_| {})?;
+        let spec: Spec = technique.parse()?;
+        let (plan, _) = pixels::plan(&spec, &self.camera, &self.light, &self.bounds)?;
+        let reference = Reference::render(self.tracer, &plan, &|_| {})?;
         // Pixels at their centres, as renderers shade.
         let view = View::new(self.tracer, self.camera, self.light, 1)?;
         let mut picture = Shadowed::default();

@@ -13,6 +13,7 @@ fn every_command_has_help_with_an_example() {
         &["theory"],
         &["bench"],
         &["devices"],
+        &["help"],
     ] {
         for flag in ["--help", "-h"] {
             let args = [command, &[flag]].concat();
@@ -28,6 +29,25 @@ fn every_command_has_help_with_an_example() {
             );
         }
     }
+}
+
+/// The language stands in one place, and every command's help points there.
+#[test]
+fn help_has_topics() {
+    let desk = Desk::new();
+    let language = desk.succeed(&["help", "shadows"]);
+    for word in ["pcfN", "+zK", "lambda=NUMBER", "(blur=WIDTH)", "cascades", "@TEXELS"] {
+        assert!(language.contains(word), "{word}: {language}");
+    }
+    for command in ["render", "compare", "sweep", "plan", "bench"] {
+        let own = desk.succeed(&[command, "--help"]);
+        assert_eq!(desk.succeed(&["help", command]), own);
+        assert!(own.contains("umbrage help shadows"), "{command}: {own}");
+        assert!(!own.contains("evsm"), "{command} repeats the language: {own}");
+    }
+    assert_eq!(desk.succeed(&["help"]), desk.succeed(&["--help"]));
+    let run = desk.run(&["help", "rendr"]);
+    assert!(run.code != 0 && run.stderr.contains("rendr"), "{}", run.stderr);
 }
 
 #[test]

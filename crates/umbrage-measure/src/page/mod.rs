@@ -5,7 +5,6 @@ mod figures;
 mod numbers;
 mod sweep;
 mod table;
-mod techniques;
 mod view;
 
 use crate::{Error, ErrorScale, Pictures, Report, write_file};

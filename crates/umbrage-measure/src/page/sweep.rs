@@ -2,7 +2,7 @@
 
 use super::numbers::{percent, significant};
 use super::table::{self, Cell, Column};
-use super::view::{Finding, plural, rays_a_pixel, techniques, url};
+use super::view::{Finding, codes, plural, rays_a_pixel, techniques, url};
 use crate::pictures::TRUTH_COLOR;
 use crate::{Error, Mean, Measured, Sweep, SweptView, write_file};
 use askama::Template;
@@ -62,6 +62,7 @@ struct Html<'a> {
     columns: Vec<Column>,
     undefined: bool,
     techniques: Vec<(String, &'static str)>,
+    codes: Vec<(String, String)>,
     setup: Vec<(&'static str, String)>,
     command: Option<&'a str>,
 }
@@ -102,6 +103,12 @@ impl<'a> Html<'a> {
             true,
         ));
         let shadows = settings.shadows.iter().map(String::as_str);
+        // An option asks for what specifications do not say.
+        let executed = settings.shadows.iter().map(|shadows| match settings.max_error {
+            Some(pixels) if !shadows.contains('@') => format!("{shadows}@{pixels}px"),
+            _ => shadows.clone(),
+        });
+        let executed: Vec<String> = executed.collect();
         Self {
             css: include_str!("../../assets/report.css"),
             js: include_str!("../../assets/table.js"),
@@ -119,6 +126,7 @@ impl<'a> Html<'a> {
             views: sweep.views.iter().map(|v| Shown::new(v, &columns)).collect(),
             undefined: results.iter().any(|r| r.error_px.undefined > 0),
             columns,
+            codes: codes(shadows.clone().zip(executed.iter().map(String::as_str))),
             techniques: techniques(shadows),
             setup: setup(sweep),
             command,

@@ -4,7 +4,6 @@ use super::Page;
 use super::chart::{self, Line, Tick};
 use super::numbers::{count, duration_ms, percent, plain, significant, vector};
 use super::table::{self, Cell, Column};
-use super::techniques::description;
 use crate::{Error, LightInfo, Measured, Pictures, Report};
 use askama::Template;
 use serde::Serialize;
@@ -39,6 +38,7 @@ pub(super) struct Html<'a> {
     noise: bool,
     setup: Vec<(&'static str, String)>,
     techniques: Vec<(String, &'static str)>,
+    codes: Vec<(String, String)>,
     notices: &'a [String],
     command: Option<&'a str>,
 }
@@ -64,7 +64,8 @@ struct Shown<'a> {
     line: Line,
     wrong: Option<String>,
     best: bool,
-    description: Option<&'static str>,
+    /// The words of its specification, each with a sentence.
+    description: Vec<(String, &'static str)>,
     /// Figures under the card's name.
     figures: Vec<(&'static str, String)>,
     /// Pictures that have no place of their own on the card: label and file.
@@ -106,7 +107,7 @@ impl<'a> Html<'a> {
                 line,
                 wrong: result.metrics.wrong_fraction.map(percent),
                 best: best == Some(i),
-                description: description(&result.shadows),
+                description: umbrage::language::explain(&result.shadows),
                 figures: figures(result),
                 more: pictures
                     .files()
@@ -145,6 +146,12 @@ impl<'a> Html<'a> {
             noise: report.results.iter().any(|r| r.noise.is_some()),
             setup: setup(report),
             techniques: techniques(report.results.iter().map(|r| r.shadows.as_str())),
+            codes: codes(
+                report
+                    .results
+                    .iter()
+                    .map(|r| (r.shadows.as_str(), r.technique.as_deref().unwrap_or(&r.shadows))),
+            ),
             notices,
             command,
         })
@@ -301,21 +308,31 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
     setup
 }
 
-/// The warps of these specifications, each with a sentence.
+/// The words of these specifications, each with a sentence.
 pub(super) fn techniques<'a>(
     specifications: impl Iterator<Item = &'a str>,
 ) -> Vec<(String, &'static str)> {
     let mut techniques: Vec<(String, &'static str)> = Vec::new();
     for shadows in specifications {
-        let Some(text) = description(shadows) else {
-            continue;
-        };
-        if techniques.iter().all(|(_, known)| *known != text) {
-            let name = shadows.split(['+', ':', '@']).next().unwrap_or_default();
-            techniques.push((name.to_owned(), text));
+        for (word, text) in umbrage::language::explain(shadows) {
+            if techniques.iter().all(|(_, known)| *known != text) {
+                techniques.push((word, text));
+            }
         }
     }
     techniques
+}
+
+/// Specifications, and the Rust code that makes the technique which each stands for.
+pub(super) fn codes<'a>(
+    techniques: impl Iterator<Item = (&'a str, &'a str)>,
+) -> Vec<(String, String)> {
+    techniques
+        .filter_map(|(shadows, technique)| {
+            let technique: umbrage::Technique = technique.parse().ok()?;
+            Some((shadows.to_owned(), technique.rust_code()))
+        })
+        .collect()
 }
 
 /// What the script needs, as JSON that can stand inside an HTML `script` element.

@@ -222,6 +222,7 @@ impl Compared {
             pictures.push(write_pictures(folder, i + 1, name, &seen, &truth, scale).unwrap());
             results.push(Measured {
                 shadows: name.clone(),
+                technique: None,
                 backend: "reference".to_owned(),
                 device: None,
                 maps: 1 + u32::from(name.contains("z2")),

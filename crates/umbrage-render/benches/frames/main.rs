@@ -14,9 +14,8 @@ mod bare;
 use bare::BareDepth;
 use std::path::PathBuf;
 use std::time::Instant;
-use umbrage::visibility::statistic::{Csm, Statistic};
-use umbrage::visibility::{Blur, Filter, Prefilter, Width};
-use umbrage::{Bounds, Camera, Light, Options, Partition, Plan, Planner, Size, Warp};
+use umbrage::visibility::Filter;
+use umbrage::{Bounds, Camera, Light, Plan, Planner, Technique};
 use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -46,17 +45,10 @@ impl<'a> Set<'a> {
         Ok(Self { gpu, scene, buffers: SceneBuffers::new(gpu, scene, true)?, camera, light, boxes })
     }
 
-    fn plan(&self, warp: Warp, slices: u32, side: u64) -> Result<Plan, Failure> {
-        let size = Size::Budget(side * side);
-        self.plan_sized(warp, slices, size)
-    }
-
-    fn plan_sized(&self, warp: Warp, slices: u32, size: Size) -> Result<Plan, Failure> {
-        let partition = Partition::slices(slices);
-        let options = Options { warp, partition, size, ..Options::default() };
+    fn plan(&self, technique: &Technique) -> Result<Plan, Failure> {
         let bounds =
             Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
-        Ok(Planner::new().plan(&self.camera, &[self.light], &bounds, &options)?.clone())
+        Ok(Planner::new().plan(&self.camera, &[self.light], &bounds, technique)?.clone())
     }
 
     fn renderer(&self, filter: Filter) -> Result<Renderer<'_, 'a>, Failure> {
@@ -102,12 +94,11 @@ fn race(jobs: &mut [&mut dyn FnMut() -> Result<(), Failure>]) -> Result<Vec<f64>
 
 /// Techniques against each other.
 fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
-    let plans = [(Warp::Uniform, 1), (Warp::Lispsm, 1), (Warp::Lispsm, 4)];
-    let plans = plans.map(|(warp, slices)| set.plan(warp, slices, 1024));
-    let [uniform, lispsm, slices] = plans;
-    let (uniform, lispsm, slices) = (uniform?, lispsm?, slices?);
+    let plan = |text: &str| set.plan(&text.parse()?);
+    let (uniform, lispsm) = (plan("uniform:pcf3@1024")?, plan("lispsm:pcf3@1024")?);
+    let slices = plan("lispsm+z4:pcf3@1024")?;
     let target = FrameTarget::new(set.gpu, set.camera.image())?;
-    let pcf = Filter::pcf(3)?;
+    let pcf = uniform.filter;
     let [mut a, mut b, mut c] = [set.renderer(pcf)?, set.renderer(pcf)?, set.renderer(pcf)?];
     let times = race(&mut [
         &mut || set.frame(&mut a, &uniform, &target),
@@ -127,13 +118,12 @@ fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
 
 /// The depth pass against one without any library, and against nothing to do.
 fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
-    let plan = set.plan(Warp::Lispsm, 1, 2048)?;
-    let pcf = Filter::pcf(3)?;
-    let mut moved = set.renderer(pcf)?;
-    let mut still = set.renderer(pcf)?;
+    let plan = set.plan(&"lispsm:pcf3@2048".parse()?)?;
+    let mut moved = set.renderer(plan.filter)?;
+    let mut still = set.renderer(plan.filter)?;
     let mut bare = BareDepth::new(set.gpu, set.scene, &plan);
     let start = Instant::now();
-    still.draw_maps(&plan, Casters::Still, None)?;
+    still.draw_maps(&plan, Casters::Unmoved, None)?;
     set.gpu.wait()?;
     let first = start.elapsed().as_secs_f64() * 1e3;
     let times = race(&mut [
@@ -146,7 +136,7 @@ fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
             Ok(set.gpu.wait()?)
         },
         &mut || {
-            still.draw_maps(&plan, Casters::Still, None)?;
+            still.draw_maps(&plan, Casters::Unmoved, None)?;
             Ok(set.gpu.wait()?)
         },
     ])?;
@@ -165,34 +155,23 @@ fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
 /// Convolution shadow maps against bilinear comparisons, in the configuration of Annen et al. 2007, Table 1: a map of 1024², a picture of 1024×768.
 fn filters(gpu: &Gpu, scene: &Scene) -> Result<(), Failure> {
     let set = Set::new(gpu, scene, [1024, 768])?;
-    let plan = set.plan_sized(Warp::Uniform, 1, Size::Exact([1024; 2]))?;
     let target = FrameTarget::new(gpu, set.camera.image())?;
-    let csm = |order, blur, half| -> Result<Filter, Failure> {
-        let statistic = Statistic::Csm(Csm::new(order, 0.0, false, true)?);
-        Ok(Filter::Prefiltered(Prefilter { statistic, blur, half }))
-    };
-    let pixel = Blur::Width(Width::Pixels(1.0));
-    let contenders = [
-        ("pcf2", Filter::pcf(2)?),
-        ("csm4", csm(4, Blur::Texels(1), false)?),
-        ("csm8", csm(8, Blur::Texels(1), false)?),
-        ("csm16", csm(16, Blur::Texels(1), false)?),
-        ("csm4(blur=7)", csm(4, Blur::Texels(7), false)?),
-        ("csm4(blur=3,half)", csm(4, Blur::Texels(3), true)?),
-        ("csm4(blur=1px)", csm(4, pixel, false)?),
-    ];
-    let mut renderers = Vec::new();
-    for (_, filter) in contenders {
-        renderers.push(set.renderer(filter)?);
+    let names =
+        ["pcf2", "csm4", "csm8", "csm16", "csm4(blur=7)", "csm4(blur=3,half)", "csm4(blur=1px)"];
+    let mut contenders = Vec::new();
+    for name in names {
+        let plan = set.plan(&format!("uniform:{name}@1024x1024").parse()?)?;
+        contenders.push((set.renderer(plan.filter)?, plan));
     }
-    let mut jobs: Vec<_> = renderers.iter_mut().map(|r| || set.frame(r, &plan, &target)).collect();
+    let mut jobs: Vec<_> =
+        contenders.iter_mut().map(|(r, plan)| || set.frame(r, plan, &target)).collect();
     let mut jobs: Vec<&mut dyn FnMut() -> Result<(), Failure>> =
         jobs.iter_mut().map(|job| job as _).collect();
     let times = race(&mut jobs)?;
     let triangles: usize =
         scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len()).sum();
     println!("{}, {triangles} triangles, 1024² texels, 1024×768:", scene.name);
-    for ((name, _), time) in contenders.iter().zip(&times) {
+    for (name, time) in names.iter().zip(&times) {
         println!("  {name}: {time:.1} ms, {:.3} of pcf2", time / times[0]);
     }
     Ok(())

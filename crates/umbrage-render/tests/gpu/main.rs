@@ -6,7 +6,7 @@ mod trouble;
 
 use std::path::PathBuf;
 use std::sync::LazyLock;
-use umbrage::{Aabb, Bounds, Camera, Light, Options, Plan, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner, Technique};
 use umbrage_render::Gpu;
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -53,9 +53,10 @@ impl<'a> Set<'a> {
         self.scene.default_light().light
     }
 
-    pub(crate) fn plan(&self, lights: &[Light], options: &Options) -> Plan {
+    pub(crate) fn plan(&self, lights: &[Light], technique: &Technique) -> Plan {
         let bounds =
             Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
-        Planner::new().plan(&self.camera, lights, &bounds, options).unwrap().clone()
+        let mut planner = Planner::with_limits(Limits { max_side: 65536, ..Limits::default() });
+        planner.plan(&self.camera, lights, &bounds, technique).unwrap().clone()
     }
 }

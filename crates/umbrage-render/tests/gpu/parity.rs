@@ -3,10 +3,8 @@
 use crate::{GPU, Set, scene};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
-use umbrage::{
-    Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
-};
+use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
+use umbrage::{Camera, Light, Plan, SpotLight, Technique};
 use umbrage_render::{Look, Renderer, Sample, SceneBuffers};
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
@@ -14,30 +12,22 @@ use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
 const IMAGE: [u32; 2] = [240, 135];
 
 /// Every warp that a GPU can draw, and every partition, each at least once.
-fn techniques() -> Vec<(&'static str, Options)> {
-    let whole = Partition::default();
-    let faces = Partition { faces: Faces::SidesAndNear, ..whole };
-    let sides = Partition { faces: Faces::Sides, ..Partition::slices(2) };
-    let fitted = Partition { splits: Splits::Fitted, overlap: 0.2, ..Partition::slices(3) };
-    let practical = Partition { splits: Splits::Practical(0.5), ..Partition::slices(4) };
-    let options = |warp, partition| Options {
-        warp,
-        partition,
-        size: Size::Budget(512 * 512),
-        ..Options::default()
-    };
-    vec![
-        ("unfocused", options(Warp::Unfocused, whole)),
-        ("uniform+z4", options(Warp::Uniform, Partition::slices(4))),
-        ("uniform(stable)+z4(practical)", options(Warp::Stable, practical)),
-        ("psm", options(Warp::Psm, whole)),
-        ("lispsm", options(Warp::Lispsm, whole)),
-        ("lispsm+face", options(Warp::Lispsm, faces)),
-        ("tsm+z2+face(sides)", options(Warp::Tsm { focus: None }, sides)),
-        ("adaptive+z3(fitted,overlap)", options(Warp::Adaptive(Objective::Storage), fitted)),
-        ("adaptive(area)", options(Warp::Adaptive(Objective::Area), whole)),
-        ("lambda=5", options(Warp::Lambda(5.0), whole)),
-    ]
+const TECHNIQUES: [&str; 10] = [
+    "unfocused@512",
+    "uniform+z4@512",
+    "uniform(stable)+z4(practical=0.5)@512",
+    "psm@512",
+    "lispsm@512",
+    "lispsm+face@512",
+    "tsm+z2+face(sides)@512",
+    "adaptive+z3(fitted,overlap=0.2)@512",
+    "adaptive(area)@512",
+    "lambda=5@512",
+];
+
+/// A technique of the list with another filter.
+fn technique(text: &str, filter: Filter) -> Technique {
+    Technique { filter, ..text.parse().unwrap() }
 }
 
 /// How the GPU's picture and the reference's differ, of the samples that count.
@@ -59,7 +49,6 @@ fn compare(
     set: &Set<'_>,
     plan: &Plan,
     light: (usize, &Light),
-    filter: Filter,
     samples: &[Sample],
     reference: &Reference<'_>,
 ) -> Difference {
@@ -100,7 +89,7 @@ fn compare(
         let is_same = (gpu.visibility - expected).abs() < 1e-3;
         d.color += usize::from(is_same && (color - gpu.radiance).abs().max_element() > 0.02);
     }
-    assert!(d.counted > 200, "{filter}: {} samples count", d.counted);
+    assert!(d.counted > 200, "{}: {} samples count", plan.filter, d.counted);
     d
 }
 
@@ -113,15 +102,15 @@ fn draw(
 ) -> Vec<Sample> {
     let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
     let mut renderer = Renderer::with_support(&GPU, &buffers, options, support).unwrap();
-    renderer.draw_maps(plan, Casters::Still, None).unwrap();
+    renderer.draw_maps(plan, Casters::Unmoved, None).unwrap();
     renderer.samples(look, 0..set.camera.image()[1], 1, true).unwrap()
 }
 
 /// The shares that may differ, of the samples that count.
-fn check(name: &str, technique: &str, filter: Filter, d: &Difference) {
+fn check(name: &str, technique: &Technique, d: &Difference) {
     let share = |n: usize| n as f64 / d.counted as f64;
     let text = format!(
-        "{name}, {technique}:{filter}: visibility {:.4}, surface {:.4}, place {:.4}, error {:.4}, color {:.4} of {}",
+        "{name}, {technique}: visibility {:.4}, surface {:.4}, place {:.4}, error {:.4}, color {:.4} of {}",
         share(d.visibility),
         share(d.surface),
         share(d.place),
@@ -137,88 +126,84 @@ fn check(name: &str, technique: &str, filter: Filter, d: &Difference) {
 }
 
 /// Some techniques in a scene's own view and light.
-fn agrees(name: &str, techniques: &[(&str, Options)]) {
+///
+/// Those of [`TECHNIQUES`] with these indices: every scene has some, every technique two scenes at least.
+fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
     let scene = scene(name);
     let set = Set::new(&scene, IMAGE);
-    for (i, (technique, options)) in techniques.iter().enumerate() {
+    for (i, index) in indices.into_iter().enumerate() {
         let filter = if i % 2 == 0 { Filter::Hard } else { Filter::Pcf { n: 3 } };
-        agrees_with(name, &set, technique, options, filter);
+        agrees_with(name, &set, &technique(TECHNIQUES[index], filter));
     }
 }
 
-/// One technique and filter in a scene's own light.
-fn agrees_with(name: &str, set: &Set<'_>, technique: &str, options: &Options, filter: Filter) {
+/// One technique in a scene's own light.
+fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     let light = set.light();
-    let plan = set.plan(&[light], options);
+    let plan = set.plan(&[light], technique);
     let look = Look { camera: &set.camera, light: &light, light_index: 0 };
-    let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
-    let samples = draw(set, &plan, &look, &shadow_options, GPU.support());
-    let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
-    let difference = compare(set, &plan, (0, &light), filter, &samples, &reference);
-    check(name, technique, filter, &difference);
-}
-
-/// Those of [`techniques`] with these indices: every scene has some, every technique two scenes at least.
-fn some(indices: &[usize]) -> Vec<(&'static str, Options)> {
-    let all = techniques();
-    indices.iter().map(|&i| all[i]).collect()
+    let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+    let samples = draw(set, &plan, &look, &options, GPU.support());
+    let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+    let difference = compare(set, &plan, (0, &light), &samples, &reference);
+    check(name, technique, &difference);
 }
 
 #[test]
 fn in_a_town() {
-    agrees("town:40", &techniques());
+    agrees("town:40", 0..TECHNIQUES.len());
 }
 
 #[test]
 fn on_an_airfield() {
-    agrees("airfield", &some(&[1, 3, 5, 7]));
+    agrees("airfield", [1, 3, 5, 7]);
 }
 
 #[test]
 fn among_statues() {
-    agrees("statues", &some(&[0, 4, 8]));
+    agrees("statues", [0, 4, 8]);
 }
 
 #[test]
 fn in_a_grove() {
-    agrees("grove", &some(&[2, 6, 9]));
+    agrees("grove", [2, 6, 9]);
 }
 
 #[test]
 fn at_a_fence() {
-    agrees("fence", &some(&[1, 4, 7]));
+    agrees("fence", [1, 4, 7]);
 }
 
 /// A point light: six maps, or more.
 #[test]
 fn around_a_lantern() {
-    agrees("lantern", &some(&[1, 4, 7, 9]));
+    agrees("lantern", [1, 4, 7, 9]);
 }
 
 #[test]
 fn on_a_race_track() {
-    agrees("vehicles/kenney_racing_level.glb", &some(&[2, 3, 5, 8]));
+    agrees("vehicles/kenney_racing_level.glb", [2, 3, 5, 8]);
 }
 
 /// Alpha masks.
 #[test]
 fn in_a_forest() {
-    agrees("trees/forest_eztree.glb", &some(&[0, 6, 7]));
+    agrees("trees/forest_eztree.glb", [0, 6, 7]);
 }
 
 #[test]
 fn in_an_atrium() {
-    agrees("atrium/sponza_atrium_reduced.glb", &some(&[1, 5, 9]));
+    agrees("atrium/sponza_atrium_reduced.glb", [1, 5, 9]);
 }
 
 #[test]
 fn over_kilometres_of_terrain() {
-    agrees("terrain/jacksboro_dem_terrain.glb", &some(&[3, 4, 8]));
+    agrees("terrain/jacksboro_dem_terrain.glb", [3, 4, 8]);
 }
 
 #[test]
 fn in_a_house_of_centimetres() {
-    agrees("house/house.glb", &some(&[2, 4, 6]));
+    agrees("house/house.glb", [2, 4, 6]);
 }
 
 /// Whatever a device lacks, the picture is the same, but for what comparisons by the texture unit cost.
@@ -227,15 +212,15 @@ fn every_fallback_draws_the_same_picture() {
     let scene = scene("town:20");
     let set = Set::new(&scene, IMAGE);
     let light = set.light();
-    let (technique, options) = techniques()[7];
-    let plan = set.plan(&[light], &options);
     let look = Look { camera: &set.camera, light: &light, light_index: 0 };
     let all = GPU.support();
     for filter in [Filter::Hard, Filter::Pcf { n: 3 }] {
-        let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
+        let technique = technique(TECHNIQUES[7], filter);
+        let plan = set.plan(&[light], &technique);
+        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
         let difference = |options: ShadowOptions, support| {
             let samples = draw(&set, &plan, &look, &options, support);
-            compare(&set, &plan, (0, &light), filter, &samples, &reference)
+            compare(&set, &plan, (0, &light), &samples, &reference)
         };
         let base = ShadowOptions { filter, ..ShadowOptions::default() };
         for (lacking, options, support) in [
@@ -244,7 +229,7 @@ fn every_fallback_draws_the_same_picture() {
             ("layers", ShadowOptions { layout: Layout::Layers, ..base }, all),
         ] {
             let name = format!("town without {lacking}");
-            check(&name, technique, filter, &difference(options, support));
+            check(&name, &technique, &difference(options, support));
         }
         let hardware = ShadowOptions { comparison: Comparison::Hardware, ..base };
         let by_option = difference(hardware, all);
@@ -275,10 +260,9 @@ fn every_prefilter_in_four_scenes() {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         for (i, statistic) in statistics.into_iter().enumerate() {
-            let (technique, options) = techniques()[[1, 4, 7][i % 3]];
             let half = i % 2 == 1;
             let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5), half });
-            agrees_with(name, &set, technique, &options, filter);
+            agrees_with(name, &set, &technique(TECHNIQUES[[1, 4, 7][i % 3]], filter));
         }
     }
 }
@@ -294,20 +278,21 @@ fn every_width_in_four_scenes() {
     for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
+        // A diameter of 0.3: of a sun per metre of distance, of a lamp in metres.
+        let is_sun = matches!(set.light(), Light::Directional { .. });
+        let light = if is_sun { LightSize::Degrees(17.1) } else { LightSize::Metres(0.3) };
         let filters = [
             Filter::Spread { n: 5, width: Width::Pixels(3.0), pattern: Pattern::Grid },
             Filter::Spread { n: 4, width: Width::Metres(0.5), pattern: Pattern::Grid },
             Filter::Spread { n: 6, width: Width::Metres(0.4), pattern: Pattern::Poisson },
-            Filter::Pcss { n: 6, source: 0.3 },
+            Filter::Pcss { n: 6, light },
             prefilter(Statistic::Vsm(Vsm::default()), Width::Pixels(4.0)),
             prefilter(csm, Width::Pixels(2.0)),
             prefilter(csm, Width::Metres(0.6)),
             prefilter(Statistic::Msm(Msm::default()), Width::Metres(3.0)),
         ];
         for (i, filter) in filters.into_iter().enumerate() {
-            let (technique, mut options) = techniques()[[1, 4, 7][i % 3]];
-            options.keeps_casters = matches!(filter, Filter::Pcss { .. });
-            agrees_with(name, &set, technique, &options, filter);
+            agrees_with(name, &set, &technique(TECHNIQUES[[1, 4, 7][i % 3]], filter));
         }
     }
 }
@@ -327,20 +312,15 @@ fn several_lights_share_a_plan() {
     };
     let lights =
         [Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) }, Light::Spot(spot), bulb];
-    let options = Options {
-        partition: Partition::slices(2),
-        size: Size::Budget(768 * 768),
-        ..Options::default()
-    };
-    let plan = set.plan(&lights, &options);
-    let filter = Filter::Pcf { n: 2 };
-    let reference = Reference::render(&set.tracer, &plan, filter, &|_| {}).unwrap();
+    let technique = technique("adaptive+z2@768", Filter::Pcf { n: 2 });
+    let plan = set.plan(&lights, &technique);
+    let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     for (index, light) in lights.iter().enumerate() {
         let look = Look { camera: &set.camera, light, light_index: index as u32 };
-        let shadow_options = ShadowOptions { filter, ..ShadowOptions::default() };
-        let samples = draw(&set, &plan, &look, &shadow_options, GPU.support());
-        let difference = compare(&set, &plan, (index, light), filter, &samples, &reference);
-        check("lantern", &format!("light {index}"), filter, &difference);
+        let options = ShadowOptions { filter: plan.filter, ..ShadowOptions::default() };
+        let samples = draw(&set, &plan, &look, &options, GPU.support());
+        let difference = compare(&set, &plan, (index, light), &samples, &reference);
+        check(&format!("lantern, light {index}"), &technique, &difference);
     }
 }
 
@@ -366,12 +346,13 @@ fn a_million_metres_from_the_origin() {
     })
     .unwrap();
     let light = near.default_light().light;
-    for (technique, options) in &techniques()[3..5] {
-        let plan = set.plan(&[light], options);
+    for text in &TECHNIQUES[3..5] {
+        let technique = technique(text, Filter::Hard);
+        let plan = set.plan(&[light], &technique);
         let look = Look { camera: &set.camera, light: &light, light_index: 0 };
         let samples = draw(&set, &plan, &look, &ShadowOptions::default(), GPU.support());
-        let reference = Reference::render(&set.tracer, &plan, Filter::Hard, &|_| {}).unwrap();
-        let difference = compare(&set, &plan, (0, &light), Filter::Hard, &samples, &reference);
-        check("pole", technique, Filter::Hard, &difference);
+        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+        let difference = compare(&set, &plan, (0, &light), &samples, &reference);
+        check("pole", &technique, &difference);
     }
 }

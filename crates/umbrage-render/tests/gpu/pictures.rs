@@ -1,7 +1,7 @@
 //! Frames and samples are of one picture, however it is cut.
 
 use crate::{GPU, Set, scene};
-use umbrage::{Options, Partition};
+use umbrage::{Partition, Technique};
 use umbrage_render::{FrameTarget, Look, Renderer, SceneBuffers, Timer};
 use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -43,12 +43,12 @@ fn a_frame_looks_as_its_samples_do() {
     let scene = scene("town:20");
     let set = Set::new(&scene, [301, 170]);
     let light = set.light();
-    let plan = set.plan(&[light], &Options::default());
+    let plan = set.plan(&[light], &Technique::default());
     let look = Look { camera: &set.camera, light: &light, light_index: 0 };
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
     let timer = Timer::new(&GPU).expect("timestamps");
-    let drawn = renderer.draw_maps(&plan, Casters::Still, Some(&timer)).unwrap();
+    let drawn = renderer.draw_maps(&plan, Casters::Unmoved, Some(&timer)).unwrap();
     assert!(drawn[0].1.triangles > 1000 && drawn[0].1.draws > 0, "{drawn:?}");
     let target = FrameTarget::new(&GPU, set.camera.image()).unwrap();
     renderer.frame(&look, &target, Some(&timer)).unwrap();
@@ -67,12 +67,12 @@ fn a_frame_looks_as_its_samples_do() {
 fn samples_are_those_of_a_larger_picture() {
     let scene = scene("sphere");
     let light = Set::new(&scene, [8, 8]).light();
-    let options = Options { partition: Partition::slices(2), ..Options::default() };
+    let technique = Technique { partition: Partition::slices(2), ..Technique::default() };
     let coarse = Set::new(&scene, [700, 96]);
-    let plan = coarse.plan(&[light], &options);
+    let plan = coarse.plan(&[light], &technique);
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
-    renderer.draw_maps(&plan, Casters::Still, None).unwrap();
+    renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
     let look = Look { camera: &coarse.camera, light: &light, light_index: 0 };
     // Twice 700 samples do not fit into one tile.
     let samples = renderer.samples(&look, 40..70, 2, true).unwrap();
@@ -99,10 +99,13 @@ fn still_maps_are_drawn_once() {
     let scene = scene("fence");
     let set = Set::new(&scene, [64, 36]);
     let light = set.light();
-    let options = Options { partition: Partition::slices(3), ..Options::default() };
-    let plan = set.plan(&[light], &options);
+    let technique = Technique { partition: Partition::slices(3), ..Technique::default() };
+    let plan = set.plan(&[light], &technique);
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
     let mut drawn = |casters| renderer.draw_maps(&plan, casters, None).unwrap().len();
-    assert_eq!([drawn(Casters::Still), drawn(Casters::Still), drawn(Casters::Moved)], [3, 0, 3]);
+    assert_eq!(
+        [drawn(Casters::Unmoved), drawn(Casters::Unmoved), drawn(Casters::Moved)],
+        [3, 0, 3]
+    );
 }

@@ -1,7 +1,7 @@
 //! What cannot be done is said, and nothing panics.
 
 use crate::{GPU, Set, scene};
-use umbrage::{Options, Size, Warp};
+use umbrage::{Size, Technique, Warp};
 use umbrage_render::{Error, FrameTarget, Gpu, Look, Renderer, SceneBuffers, devices};
 use umbrage_wgpu::{Casters, ShadowOptions};
 
@@ -19,11 +19,11 @@ fn a_lost_device_is_reported() {
     let scene = scene("pole");
     let set = Set::new(&scene, [32, 18]);
     let light = set.light();
-    let plan = set.plan(&[light], &Options::default());
+    let plan = set.plan(&[light], &Technique::default());
     let look = Look { camera: &set.camera, light: &light, light_index: 0 };
     let buffers = SceneBuffers::new(&gpu, &scene, false).unwrap();
     let mut renderer = Renderer::new(&gpu, &buffers, &ShadowOptions::default()).unwrap();
-    renderer.draw_maps(&plan, Casters::Still, None).unwrap();
+    renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
     gpu.device().destroy();
     let lost = |e: Error| assert!(matches!(e, Error::Lost(_)), "{e}");
     lost(renderer.samples(&look, 0..18, 1, true).unwrap_err());
@@ -41,13 +41,13 @@ fn what_is_too_large_is_named() {
     assert!(error.to_string().contains("is too large for this GPU"), "{error}");
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
-    let options = Options { size: Size::Exact([max, 1]), max_side: 65536, ..Options::default() };
-    renderer.draw_maps(&set.plan(&[light], &options), Casters::Still, None).unwrap();
-    let options = Options { size: Size::Exact([max + 1, 1]), ..options };
-    let plan = set.plan(&[light], &options);
-    let error = renderer.draw_maps(&plan, Casters::Still, None).unwrap_err();
+    let technique = Technique { size: Size::Exact([max, 1]), ..Technique::default() };
+    renderer.draw_maps(&set.plan(&[light], &technique), Casters::Unmoved, None).unwrap();
+    let technique = Technique { size: Size::Exact([max + 1, 1]), ..technique };
+    let plan = set.plan(&[light], &technique);
+    let error = renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap_err();
     assert!(error.to_string().contains("no room for 1 shadow maps"), "{error}");
-    let log = Options { warp: Warp::Log, ..Options::default() };
-    let error = renderer.draw_maps(&set.plan(&[light], &log), Casters::Still, None).unwrap_err();
+    let log = Technique { warp: Warp::Log, ..Technique::default() };
+    let error = renderer.draw_maps(&set.plan(&[light], &log), Casters::Unmoved, None).unwrap_err();
     assert!(error.to_string().contains("no GPU rasterises"), "{error}");
 }

@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DMat4, DVec2, DVec3, Vec2, Vec3, Vec4};
 use umbrage::{
-    Bounds, Camera, Light, LookAt, MapError, Options, Part, Plan, Planner, Rows, ShadowMap,
+    Bounds, Camera, Light, LookAt, MapError, Part, Plan, Planner, Rows, ShadowMap, Technique,
 };
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene};
 use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer};
@@ -138,7 +138,6 @@ pub(crate) fn even_map(
         storage_factor: 1.0,
         caster_planes: Vec::new(),
         apex: None,
-        pixel_gradient: DVec3::ZERO,
         slab: umbrage::Slab::default(),
     }
 }
@@ -225,7 +224,7 @@ impl Random {
 }
 
 /// Plans one light's maps for all of a scene.
-pub(crate) fn plan(scene: &Scene, camera: &Camera, light: Light, options: &Options) -> Plan {
+pub(crate) fn plan(scene: &Scene, camera: &Camera, light: Light, technique: &Technique) -> Plan {
     let bounds = Bounds::of_scene(scene.bounds());
-    Planner::new().plan(camera, &[light], &bounds, options).unwrap().clone()
+    Planner::new().plan(camera, &[light], &bounds, technique).unwrap().clone()
 }

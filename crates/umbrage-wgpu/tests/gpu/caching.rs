@@ -3,7 +3,7 @@
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
-use umbrage::{Aabb, Options, Partition, Plan, Planner, Size, Warp};
+use umbrage::{Aabb, Partition, Plan, Planner, Size, Technique, Warp};
 use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 fn shadows(bench: &Bench, layout: Layout) -> Shadows {
@@ -11,8 +11,9 @@ fn shadows(bench: &Bench, layout: Layout) -> Shadows {
     Shadows::new(&bench.device, bench.support, &options).unwrap()
 }
 
-fn options() -> Options {
-    Options { partition: Partition::slices(3), size: Size::Budget(128 * 128), ..Options::default() }
+fn technique() -> Technique {
+    let size = Size::Budget(128 * 128);
+    Technique { partition: Partition::slices(3), size, ..Technique::default() }
 }
 
 /// Which maps a frame draws.
@@ -33,13 +34,13 @@ fn what_stands_still_is_drawn_once() {
     let bench = bench();
     for layout in [Layout::Atlas, Layout::Layers] {
         let mut shadows = shadows(&bench, layout);
-        let plan = plan(&camera(EYE), &[sun()], &options());
-        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
-        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0; 0]);
+        let plan = plan(&camera(EYE), &[sun()], &technique());
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0; 0]);
         assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Moved), [0, 1, 2]);
-        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0; 0]);
-        let moved = self::plan(&camera(EYE + DVec3::X * 0.1), &[sun()], &options());
-        assert_eq!(drawn(&bench, &mut shadows, &moved, Casters::Still), [0, 1, 2]);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0; 0]);
+        let moved = self::plan(&camera(EYE + DVec3::X * 0.1), &[sun()], &technique());
+        assert_eq!(drawn(&bench, &mut shadows, &moved, Casters::Unmoved), [0, 1, 2]);
     }
 }
 
@@ -48,8 +49,8 @@ fn what_moves_is_drawn_into_the_maps_it_casts_into() {
     let bench = bench();
     for layout in [Layout::Atlas, Layout::Layers] {
         let mut shadows = shadows(&bench, layout);
-        let plan = plan(&camera(EYE), &[sun()], &options());
-        drawn(&bench, &mut shadows, &plan, Casters::Still);
+        let plan = plan(&camera(EYE), &[sun()], &technique());
+        drawn(&bench, &mut shadows, &plan, Casters::Unmoved);
         let around = |p: DVec3| Aabb::around([p - DVec3::splat(0.01), p + DVec3::splat(0.01)]);
         // Before the last slice's ground, and out of the way of all.
         let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
@@ -66,10 +67,10 @@ fn what_moves_is_drawn_into_the_maps_it_casts_into() {
 fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
     let bench = bench();
     let mut shadows = shadows(&bench, Layout::Atlas);
-    let plan = plan(&camera(EYE), &[sun()], &options());
+    let plan = plan(&camera(EYE), &[sun()], &technique());
     let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
     drop(shadows.prepare(&bench.device, &bench.queue, &frame).unwrap());
-    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
+    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
 }
 
 /// Redrawing one map of an atlas clears that map and leaves the others.
@@ -77,7 +78,7 @@ fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
 fn a_map_that_is_redrawn_leaves_its_neighbours() {
     let bench = bench();
     let mut shadows = shadows(&bench, Layout::Atlas);
-    let plan = plan(&camera(EYE), &[sun()], &options());
+    let plan = plan(&camera(EYE), &[sun()], &technique());
     let own = bench.own_casters(
         &shadows,
         "@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
@@ -111,7 +112,7 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
             values[0]
         })
     };
-    assert_eq!(frame(Casters::Still, true), [0.25; 3]);
+    assert_eq!(frame(Casters::Unmoved, true), [0.25; 3]);
     let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
     let boxes = [Aabb::around([far])];
     let expected = [0, 1, 2].map(|i| if plan.maps[i].may_cast(boxes[0]) { 1.0 } else { 0.25 });
@@ -130,9 +131,9 @@ fn a_camera_that_wanders_needs_few_textures() {
         let angle = f64::from(i) * 0.05;
         let eye = EYE + DVec3::new(angle.sin() * 6.0, 1.0 + angle.cos(), angle * 0.5);
         let bounds = umbrage::Bounds::of_scene(crate::scene());
-        let options = Options { warp: Warp::Lispsm, ..options() };
-        let plan = planner.plan(&camera(eye), &lights()[..2], &bounds, &options).unwrap();
-        let frame = Frame { plan, render_origin: plan.origin, casters: Casters::Still };
+        let technique = Technique { warp: Warp::Lispsm, ..technique() };
+        let plan = planner.plan(&camera(eye), &lights()[..2], &bounds, &technique).unwrap();
+        let frame = Frame { plan, render_origin: plan.origin, casters: Casters::Unmoved };
         let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
         let mut encoder = bench.encoder();
         prepared.encode(&mut encoder, &Timestamps::default(), |_| {});
@@ -166,11 +167,11 @@ fn empty_maps_cost_nothing() {
         image: [64, 64],
     })
     .unwrap();
-    let nothing = plan(&up, &[sun()], &options());
+    let nothing = plan(&up, &[sun()], &technique());
     assert!(nothing.maps.iter().all(umbrage::ShadowMap::is_empty));
     assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Moved), [0; 0]);
     assert_eq!(shadows.texture_bytes(), 4);
-    let plan = plan(&camera(EYE), &[sun()], &options());
-    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Still), [0, 1, 2]);
-    assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Still), [0; 0]);
+    let plan = plan(&camera(EYE), &[sun()], &technique());
+    assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
+    assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Unmoved), [0; 0]);
 }

@@ -3,7 +3,7 @@
 use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::cast_slice;
 use glam::{DAffine3, DVec3, Vec3};
-use umbrage::{Options, Partition, Size, Warp};
+use umbrage::{Partition, Size, Technique, Warp};
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
     Timestamps,
@@ -33,13 +33,13 @@ fn depths(emulated: bool, warp: Warp) -> Vec<f32> {
         Vec3::new(-70.0, 150.0, -25.0),
     ];
     let vertices = bench.buffer(cast_slice(&triangles), BufferUsages::VERTEX);
-    let options = Options {
+    let technique = Technique {
         warp,
         partition: Partition::slices(2),
         size: Size::Budget(256 * 256),
-        ..Options::default()
+        ..Technique::default()
     };
-    let plan = plan(&camera(EYE), &[sun()], &options);
+    let plan = plan(&camera(EYE), &[sun()], &technique);
     let instance = bench.instance(CasterInstance::new(&DAffine3::IDENTITY, plan.origin));
     let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
     let mut encoder = bench.encoder();

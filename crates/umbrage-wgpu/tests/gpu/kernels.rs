@@ -5,8 +5,10 @@ use crate::{EYE, bench, camera, lights, plan, scene};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
-use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width, texel_coordinates, visibility};
-use umbrage::{Faces, Objective, Options, Partition, Plan, Size, Splits, Warp};
+use umbrage::visibility::{
+    Blur, Filter, LightSize, Pattern, Prefilter, Width, texel_coordinates, visibility,
+};
+use umbrage::{Faces, Plan, Technique};
 use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -70,24 +72,20 @@ fn points(plan: &Plan, count: usize) -> Vec<(DVec3, DVec3)> {
         .collect()
 }
 
-fn options(warp: Warp, partition: Partition) -> Options {
-    Options { warp, partition, size: Size::Budget(256 * 256), ..Options::default() }
+fn technique(text: &str) -> Technique {
+    text.parse().unwrap()
 }
 
-fn techniques() -> Vec<Options> {
-    let faces = Partition { faces: Faces::SidesAndNear, ..Partition::default() };
-    let fading = Partition { overlap: 0.3, splits: Splits::Fitted, ..Partition::slices(3) };
-    vec![
-        options(Warp::Unfocused, Partition::default()),
-        options(Warp::Uniform, Partition::slices(4)),
-        options(Warp::Stable, Partition::slices(2)),
-        options(Warp::Psm, Partition::default()),
-        options(Warp::Lispsm, faces),
-        options(Warp::Tsm { focus: None }, fading),
-        options(Warp::Adaptive(Objective::Area), Partition::slices(2)),
-        options(Warp::Lambda(3.0), Partition::default()),
-    ]
-}
+const TECHNIQUES: [&str; 8] = [
+    "unfocused@256",
+    "uniform+z4@256",
+    "uniform(stable)+z2@256",
+    "psm@256",
+    "lispsm+face@256",
+    "tsm+z3(fitted,overlap=0.3)@256",
+    "adaptive(area)+z2@256",
+    "lambda=3@256",
+];
 
 /// Shadows whose texels hold depths without a pattern, in the gutters as well.
 fn random_depths(
@@ -131,7 +129,7 @@ fn expected(shadows: &Shadows, plan: &Plan, light: usize, p: DVec3, n: DVec3) ->
     for (index, share) in plan.lookup(light, p) {
         let map = &plan.maps[index];
         let place = shadows.place(index).unwrap();
-        let value = map.receiver(p, n).map_or(1.0, |r| {
+        let value = plan.receiver(index, p, n).map_or(1.0, |r| {
             visibility(map, filter, &r, |i, j| {
                 let [x, y] = [(place.origin[0], i), (place.origin[1], j)]
                     .map(|(o, i)| o.checked_add_signed(i).unwrap());
@@ -156,8 +154,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 /// Depths without a pattern make every texel count: whoever looks one texel beside, or mixes up rows, layers, gutters or
 /// weights, is found out. What is left are points on the border of a texel, to single precision.
-fn agrees(shadow_options: &ShadowOptions, options: &Options, origin: Option<DVec3>) {
-    agrees_to(2e-3, 500, shadow_options, options, origin);
+fn agrees(shadow_options: &ShadowOptions, technique: &Technique, origin: Option<DVec3>) {
+    agrees_to(2e-3, 500, shadow_options, technique, origin);
 }
 
 /// Visibility is the same to a `tolerance`, but for one point in so many.
@@ -165,13 +163,20 @@ fn agrees_to(
     tolerance: f64,
     one_in: usize,
     shadow_options: &ShadowOptions,
-    options: &Options,
+    technique: &Technique,
     origin: Option<DVec3>,
 ) {
+    let technique = &Technique { filter: shadow_options.filter, ..*technique };
     let bench = bench();
     let lights = lights();
-    let lights = if options.partition.faces == Faces::Whole { &lights[..] } else { &lights[..1] };
-    let plan = plan(&camera(EYE), lights, options);
+    let lights = match technique.filter {
+        // A sun's size is an angle, a lamp's a length.
+        Filter::Pcss { light: LightSize::Degrees(_), .. } => &lights[..1],
+        Filter::Pcss { light: LightSize::Metres(_), .. } => &lights[1..],
+        _ if technique.partition.faces == Faces::Whole => &lights[..],
+        _ => &lights[..1],
+    };
+    let plan = plan(&camera(EYE), lights, technique);
     let origin = origin.unwrap_or(plan.origin);
     let shadows = random_depths(&bench, shadow_options, &plan, origin);
     let table = points(&plan, 3000);
@@ -195,51 +200,52 @@ fn agrees_to(
             wrong += usize::from((f64::from(out) - expected).abs() > tolerance);
         }
     }
-    assert!(served > 800, "{options:?}: {served}");
-    assert!(wrong * one_in <= served, "{shadow_options:?} {options:?}: {wrong} of {served}");
+    assert!(served > 800, "{technique}: {served}");
+    assert!(wrong * one_in <= served, "{shadow_options:?} {technique}: {wrong} of {served}");
 }
 
 #[test]
 fn every_technique_is_looked_up_as_in_rust() {
-    for options in techniques() {
-        agrees(&ShadowOptions::default(), &options, None);
+    for text in TECHNIQUES {
+        agrees(&ShadowOptions::default(), &technique(text), None);
     }
 }
 
 #[test]
 fn every_filter_and_layout_is_looked_up_as_in_rust() {
-    let options = options(Warp::Lispsm, Partition::slices(2));
+    let technique = technique("lispsm+z2@256");
     for layout in [Layout::Atlas, Layout::Layers] {
         for n in [1, 2, 3, 5, 8, 15] {
             let filter = Filter::pcf(n).unwrap();
-            agrees(&ShadowOptions { filter, layout, ..Default::default() }, &options, None);
+            agrees(&ShadowOptions { filter, layout, ..Default::default() }, &technique, None);
         }
         let hard = ShadowOptions { layout, ..Default::default() };
-        agrees(&hard, &options, None);
+        agrees(&hard, &technique, None);
         // The nearest texel alone has one depth to compare with, whoever compares.
-        agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &options, None);
+        agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &technique, None);
     }
 }
 
 /// Widths in pixels and metres, soft shadows: of the many texels that a point compares, one may lie on a border.
 #[test]
 fn comparisons_over_a_width_are_those_of_rust() {
-    let mut options = options(Warp::Lispsm, Partition::slices(2));
-    options.keeps_casters = true;
+    let technique = technique("lispsm+z2@256");
     let widths = [Width::Pixels(20.0), Width::Metres(0.7)];
     let spread = widths.into_iter().flat_map(|width| {
         [Pattern::Grid, Pattern::Poisson].map(|pattern| Filter::Spread { n: 4, width, pattern })
     });
-    for filter in spread.chain([Filter::Pcss { n: 4, source: 0.05 }]) {
+    let soft = [LightSize::Degrees(2.9), LightSize::Metres(0.05)];
+    let soft = soft.map(|light| Filter::Pcss { n: 4, light });
+    for filter in spread.chain(soft) {
         let shadow_options = ShadowOptions { filter, ..Default::default() };
-        agrees_to(1.5 / 16.0, 200, &shadow_options, &options, None);
+        agrees_to(1.5 / 16.0, 200, &shadow_options, &technique, None);
     }
 }
 
 /// Numbers in smaller and smaller copies, at several places: in single precision, and in 8 bits to what these can tell.
 #[test]
 fn numbers_over_a_width_are_those_of_rust() {
-    let options = options(Warp::Lispsm, Partition::slices(2));
+    let technique = technique("lispsm+z2@256");
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
     for (statistic, tolerance) in [(Statistic::Vsm(Vsm::default()), 1e-3), (csm, 1e-2)] {
         for width in [Width::Pixels(12.0), Width::Metres(0.7)] {
@@ -247,7 +253,7 @@ fn numbers_over_a_width_are_those_of_rust() {
                 let blur = Blur::Width(width);
                 let filter = Filter::Prefiltered(Prefilter { statistic, blur, half });
                 let shadow_options = ShadowOptions { filter, ..Default::default() };
-                agrees_to(tolerance, 200, &shadow_options, &options, None);
+                agrees_to(tolerance, 200, &shadow_options, &technique, None);
             }
         }
     }
@@ -255,9 +261,9 @@ fn numbers_over_a_width_are_those_of_rust() {
 
 #[test]
 fn render_space_may_begin_anywhere_near() {
-    let options = options(Warp::Lispsm, Partition::slices(2));
-    agrees(&ShadowOptions::default(), &options, Some(DVec3::ZERO));
-    agrees(&ShadowOptions::default(), &options, Some(EYE + DVec3::new(-20.0, 3.0, 11.0)));
+    let technique = technique("lispsm+z2@256");
+    agrees(&ShadowOptions::default(), &technique, Some(DVec3::ZERO));
+    agrees(&ShadowOptions::default(), &technique, Some(EYE + DVec3::new(-20.0, 3.0, 11.0)));
 }
 
 /// On receivers that face the light all texels are compared with one depth, so that bilinear comparisons have to give the same
@@ -265,11 +271,11 @@ fn render_space_may_begin_anywhere_near() {
 #[test]
 fn hardware_comparisons_weigh_as_single_ones_do() {
     let bench = bench();
-    let options = options(Warp::Uniform, Partition::default());
-    let plan = plan(&camera(EYE), &lights()[..1], &options);
     let towards = -DVec3::new(0.5, -1.0, 0.25);
     for n in [1, 2, 3, 4, 7] {
         let filter = Filter::pcf(n).unwrap();
+        let technique = Technique { filter, ..technique("uniform@256") };
+        let plan = plan(&camera(EYE), &lights()[..1], &technique);
         let shadow_options =
             ShadowOptions { filter, comparison: Comparison::Hardware, ..Default::default() };
         let shadows = random_depths(&bench, &shadow_options, &plan, plan.origin);
@@ -309,18 +315,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn receivers_and_weights_are_those_of_rust() {
     let bench = bench();
     let extra = Bias { texels: 0.25, metres: 0.01 };
-    for options in techniques() {
-        let plan = plan(&camera(EYE), &lights()[..2], &options);
+    for text in TECHNIQUES {
+        let plan = plan(&camera(EYE), &lights()[..2], &technique(text));
         let mut shadows =
             Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();
         let mut compared = 0;
         for bias in [Bias::default(), extra] {
             shadows.set_bias(bias).unwrap();
-            let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Still };
+            let frame =
+                Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Unmoved };
             drop(shadows.prepare(&bench.device, &bench.queue, &frame).unwrap());
             // Empty maps are left out of what shaders see.
-            let full = plan.maps.iter().filter(|m| !m.is_empty());
-            for (index, map) in full.enumerate() {
+            let full = plan.maps.iter().enumerate().filter(|(_, m)| !m.is_empty());
+            for (index, (place, map)) in full.enumerate() {
                 let table = points(&plan, 400);
                 let inputs: Vec<Point> = table
                     .iter()
@@ -335,7 +342,8 @@ fn receivers_and_weights_are_those_of_rust() {
                     bench.compute(&shadows, &format!("{POINT}{RECEIVER}"), &inputs);
                 for (&(p, n), out) in table.iter().zip(outputs) {
                     let weight = map.weight(p);
-                    let Some(r) = map.receiver(p, n).filter(|_| weight > 0.0) else { continue };
+                    let r = plan.receiver(place, p, n).filter(|_| weight > 0.0);
+                    let Some(r) = r else { continue };
                     compared += 1;
                     let size = glam::UVec2::from(map.resolution).as_dvec2();
                     let texel = texel_coordinates(map, r.st);
@@ -354,7 +362,7 @@ fn receivers_and_weights_are_those_of_rust() {
                 }
             }
         }
-        assert!(compared > 300, "{options:?}: {compared}");
+        assert!(compared > 300, "{text}: {compared}");
     }
 }
 

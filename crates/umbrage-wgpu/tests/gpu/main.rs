@@ -9,7 +9,9 @@ mod trouble;
 
 use device::Bench;
 use glam::DVec3;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Options, Plan, Planner, PointLight, SpotLight};
+use umbrage::{
+    Aabb, Bounds, Camera, Light, LookAt, Plan, Planner, PointLight, SpotLight, Technique,
+};
 
 /// A view over a plain, with the sun from the left.
 pub(crate) fn camera(eye: DVec3) -> Camera {
@@ -48,9 +50,9 @@ pub(crate) fn scene() -> Aabb {
     Aabb::new(DVec3::new(-25.0, 0.0, -40.0), DVec3::new(25.0, 4.0, 12.0))
 }
 
-pub(crate) fn plan(camera: &Camera, lights: &[Light], options: &Options) -> Plan {
+pub(crate) fn plan(camera: &Camera, lights: &[Light], technique: &Technique) -> Plan {
     let bounds = Bounds::of_scene(scene());
-    Planner::new().plan(camera, lights, &bounds, options).unwrap().clone()
+    Planner::new().plan(camera, lights, &bounds, technique).unwrap().clone()
 }
 
 /// The device of a test.

@@ -5,7 +5,7 @@ use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::{Pod, Zeroable};
 use umbrage::visibility::statistic::{Channels, Csm, Esm, Evsm, MAX_CHANNELS, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter};
-use umbrage::{Options, Size, Warp};
+use umbrage::{Size, Technique, Warp};
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -122,13 +122,14 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
             )
         });
         let partition = umbrage::Partition::slices(4);
-        let plan_options = Options {
+        let technique = Technique {
             warp: Warp::Uniform,
             partition,
             size: Size::Budget(96 * 96),
-            ..Options::default()
+            filter,
+            ..Technique::default()
         };
-        let mut plan = plan(&camera(EYE), &[sun()], &plan_options);
+        let mut plan = plan(&camera(EYE), &[sun()], &technique);
         // All of the maps' depths count, not only those of the receivers there would be.
         plan.maps.iter_mut().for_each(|m| m.slab = umbrage::Slab::default());
         let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };

@@ -5,7 +5,7 @@ use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
-use umbrage::{Faces, Options, Partition, Size, Warp};
+use umbrage::{Faces, Partition, Size, Technique, Warp};
 use umbrage_wgpu::{
     Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
 };
@@ -13,11 +13,11 @@ use umbrage_wgpu::{
 fn prepare(
     bench: &Bench,
     shadows: &mut Shadows,
-    options: &Options,
+    technique: &Technique,
     origin: DVec3,
 ) -> Result<(), Error> {
-    let plan = plan(&camera(EYE), &lights(), options);
-    let frame = Frame { plan: &plan, render_origin: origin, casters: Casters::Still };
+    let plan = plan(&camera(EYE), &lights(), technique);
+    let frame = Frame { plan: &plan, render_origin: origin, casters: Casters::Unmoved };
     shadows.prepare(&bench.device, &bench.queue, &frame).map(drop)
 }
 
@@ -45,14 +45,37 @@ fn input_that_makes_no_sense_is_named() {
     ] {
         assert!(shadows.set_bias(bias).unwrap_err().to_string().starts_with("bias"));
     }
-    let small = Options { size: Size::Budget(64 * 64), ..Options::default() };
+    let small = Technique { size: Size::Budget(64 * 64), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &small, DVec3::NAN).unwrap_err();
     assert!(error.to_string().starts_with("frame.render_origin"), "{error}");
-    let log = Options { warp: Warp::Log, ..small };
+    let log = Technique { warp: Warp::Log, ..small };
     let error = prepare(&bench, &mut shadows, &log, DVec3::ZERO).unwrap_err();
     assert_eq!(error, Error::LogarithmicRows { map: 0 });
     // And all is as it was.
     prepare(&bench, &mut shadows, &small, DVec3::ZERO).unwrap();
+}
+
+/// A plan for one filter has other casters at its maps' borders, and other depths, than one for another.
+#[test]
+fn a_plan_for_another_filter_is_refused() {
+    let bench = bench();
+    let [pcf3, hard, pcss]: [Technique; 3] =
+        ["adaptive+z4:pcf3@256", "adaptive+z4@256", "adaptive+z4:pcss@256"]
+            .map(|t| t.parse().unwrap());
+    let options = ShadowOptions { filter: pcf3.filter, ..Default::default() };
+    let mut shadows = Shadows::new(&bench.device, bench.support, &options).unwrap();
+    let mut prepare = |technique: &Technique| {
+        let plan = plan(&camera(EYE), &[sun()], technique);
+        let frame = Frame { plan: &plan, render_origin: EYE, casters: Casters::Unmoved };
+        shadows.prepare(&bench.device, &bench.queue, &frame).map(drop)
+    };
+    for other in [hard, pcss] {
+        let error = prepare(&other).unwrap_err();
+        let expected = Error::OtherFilter { planned: other.filter, looked_up: pcf3.filter };
+        assert_eq!(error, expected);
+        assert!(error.to_string().contains("`pcf3`"), "{error}");
+    }
+    prepare(&pcf3).unwrap();
 }
 
 #[test]
@@ -85,15 +108,15 @@ fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
     let small = Support { storage_buffers: false, max_side: 512, max_layers: 4, ..bench.support };
     let mut shadows = Shadows::new(&bench.device, small, &ShadowOptions::default()).unwrap();
     let faces = Partition { faces: Faces::SidesAndNear, ..Partition::slices(16) };
-    let many = Options { partition: faces, size: Size::Exact([2, 2]), ..Options::default() };
+    let many = Technique { partition: faces, size: Size::Exact([2, 2]), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &many, DVec3::ZERO).unwrap_err();
     assert!(matches!(error, Error::TooMany { .. }), "{error}");
-    let large = Options { size: Size::Exact([600, 2]), ..Options::default() };
+    let large = Technique { size: Size::Exact([600, 2]), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &large, DVec3::ZERO).unwrap_err();
     assert!(matches!(error, Error::NoRoom(_)), "{error}");
     let layers = ShadowOptions { layout: Layout::Layers, ..ShadowOptions::default() };
     let mut shadows = Shadows::new(&bench.device, small, &layers).unwrap();
-    let six = Options { size: Size::Exact([8, 8]), ..Options::default() };
+    let six = Technique { size: Size::Exact([8, 8]), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &six, DVec3::ZERO).unwrap_err();
     assert!(error.to_string().contains("do not fit into 4 layers"), "{error}");
 }
@@ -104,7 +127,7 @@ fn a_lost_device_does_not_panic() {
     let bench = bench();
     let mut shadows =
         Shadows::new(&bench.device, bench.support, &ShadowOptions::default()).unwrap();
-    let plan = plan(&camera(EYE), &[sun()], &Options::default());
+    let plan = plan(&camera(EYE), &[sun()], &Technique::default());
     bench.device.destroy();
     for _ in 0..2 {
         let frame = Frame { plan: &plan, render_origin: DVec3::ZERO, casters: Casters::Moved };

@@ -1,6 +1,6 @@
 use super::{Tilted, View, check_lambda};
 use crate::error::{Error, check};
-use crate::options::Objective;
+use crate::technique::Objective;
 
 /// What a technique asks of λ: a rule for the warp of a view under light at any angle θ.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 use super::{Overhead, Rule, Tilted, View, Warped};
 use crate::error::{Error, check};
-use crate::options::{Faces, Partition};
+use crate::technique::{Faces, Partition};
 
 /// Where parallel light comes from, as W&P §5.3 has it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -39,13 +39,12 @@ mod prefilter;
 mod width;
 
 pub use prefilter::{Blur, Footprint, Prefilter};
-pub use width::Width;
+pub use width::{LightSize, Width};
 
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
 use statistic::Channels;
-use std::fmt;
 
 /// Half a unit in the last place of single precision below 1.
 const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
@@ -58,7 +57,6 @@ const ROUNDING: f64 = 1e-6;
 
 /// How the texels around a point are looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
 pub enum Filter {
     /// The nearest texel.
     #[default]
@@ -82,13 +80,13 @@ pub enum Filter {
         pattern: Pattern,
     },
     /// Percentage-closer soft shadows (Fernando 2005): a search for what hides the receiver, over all that could hide some of the light from it, tells how
-    /// wide the penumbra is; then as many comparisons over that width. Maps must tell how far casters lie:
-    /// [`Options::keeps_casters`](crate::Options::keeps_casters).
+    /// wide the penumbra is; then as many comparisons over that width. Plans for this filter
+    /// [keep the depths of casters](Self::keeps_casters).
     Pcss {
         /// n² comparisons in the search, and as many in the penumbra; clamped to 1 ..= [`MAX_DISC`](Self::MAX_DISC).
         n: u32,
-        /// Diameter of the light: of a lamp in metres, of the sun per metre of distance (twice the tangent of half its angle: 0.0093 for ours).
-        source: f32,
+        /// How large the light is: an angle for directional lights, metres for lamps.
+        light: LightSize,
     },
     /// Numbers in place of depths, filtered ahead of lookup.
     Prefiltered(Prefilter),
@@ -171,6 +169,15 @@ impl Filter {
         }
     }
 
+    /// Whether maps must tell how far casters lie, so that a plan's depths begin where the casters do
+    /// rather than where the receivers do. Casters nearer the light are flattened otherwise, which
+    /// shadow tests do not mind. It costs depth some of its digits, so there is an end: 1000 times the
+    /// receivers' range of depth, and a sixteenth of their distance from a lamp. Without known
+    /// [casters](crate::Bounds::casters) it changes nothing.
+    pub fn keeps_casters(self) -> bool {
+        matches!(self, Self::Pcss { .. })
+    }
+
     /// What the sides of a map with its gutters are rounded up to, texels. What is more lies behind the gutter's end, and is drawn like it.
     pub fn align_texels(self) -> u32 {
         match self {
@@ -210,10 +217,8 @@ impl Filter {
                 }
                 Self::pcf(*n).and_then(|_| width.check())
             }
-            Self::Pcss { n, source } => {
-                check(*source > 0.0 && *source <= 1e6, "filter.source", || {
-                    format!("must be above 0 and at most 1e6, is {source}")
-                })?;
+            Self::Pcss { n, light } => {
+                light.check()?;
                 check_disc(*n)
             }
             Self::Prefiltered(prefilter) => prefilter.check(),
@@ -225,22 +230,6 @@ fn check_disc(n: u32) -> Result<(), Error> {
     check((1..=Filter::MAX_DISC).contains(&n), "filter.n", || {
         format!("must be 1 to {} where comparisons lie in a disc, is {n}", Filter::MAX_DISC)
     })
-}
-
-/// As in a shadow specification: `hard`, `pcf5`, `csm8`.
-impl fmt::Display for Filter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Hard => f.write_str("hard"),
-            Self::Pcf { n } => write!(f, "pcf{n}"),
-            Self::Spread { n, width, pattern: Pattern::Grid } => write!(f, "pcf{n}(blur={width})"),
-            Self::Spread { n, width, pattern: Pattern::Poisson } => {
-                write!(f, "pcf{n}(blur={width},poisson)")
-            }
-            Self::Pcss { .. } => f.write_str("pcss"),
-            Self::Prefiltered(prefilter) => prefilter.statistic.fmt(f),
-        }
-    }
 }
 
 /// Where shadow coordinates lie in the map's texels: texel (i, j) spans [i, i+1] × [j, j+1].
@@ -302,8 +291,9 @@ pub fn visibility(
             let max = if pattern == Pattern::Grid { Filter::MAX_PCF } else { Filter::MAX_DISC };
             lit_share(width.metric(receiver), pattern, n.clamp(1, max))
         }
-        Filter::Pcss { n, source } => {
+        Filter::Pcss { n, light } => {
             let n = n.clamp(1, Filter::MAX_DISC);
+            let source = light.diameter();
             let across = |width: f64| receiver.texel_metric.map(|m| m * width * width);
             let penumbra = |st, depth| f64::from(source) * map.penumbra(receiver, st, depth);
             // What hides some of the light lies between here and it, where the map's depths begin at the latest.

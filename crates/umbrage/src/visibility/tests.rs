@@ -19,7 +19,8 @@ fn comparing() -> impl Iterator<Item = Filter> {
     let spread = widths.into_iter().flat_map(|width| {
         [Pattern::Grid, Pattern::Poisson].map(|pattern| Filter::Spread { n: 3, width, pattern })
     });
-    let soft = [0.01, 1e6].map(|source| Filter::Pcss { n: 3, source });
+    let soft = [LightSize::Degrees(0.53), LightSize::Metres(1e6)]
+        .map(|light| Filter::Pcss { n: 3, light });
     std::iter::once(Filter::Hard).chain(boxes).chain(spread).chain(soft)
 }
 

@@ -12,6 +12,9 @@ pub enum Width {
 }
 
 impl Width {
+    /// The largest width, pixels or metres.
+    pub const MAX: f32 = 1e6;
+
     /// Squares of the texels that a line of this width covers in s and in t, and the product of the two, as in [`Receiver::texel_metric`].
     pub(crate) fn metric(self, receiver: &Receiver) -> [f64; 3] {
         let (width, metric) = match self {
@@ -23,18 +26,72 @@ impl Width {
 
     pub(crate) fn check(self) -> Result<(), Error> {
         let (Self::Pixels(width) | Self::Metres(width)) = self;
-        check(width > 0.0 && width <= 1e6, "filter.width", || {
-            format!("must be above 0 and at most 1e6, is {width}")
+        check(width > 0.0 && width <= Self::MAX, "filter.width", || {
+            format!("must be above 0 and at most {}, is {width}", Self::MAX)
         })
     }
 }
 
-/// As in a shadow specification: `1.5px`, `0.2m`.
+/// As in a technique's text: `1.5px`, `0.2m`.
 impl fmt::Display for Width {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pixels(width) => write!(f, "{width}px"),
             Self::Metres(width) => write!(f, "{width}m"),
+        }
+    }
+}
+
+/// How large a light is, which decides how wide penumbrae are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightSize {
+    /// The angle that a directional light takes up in the sky, degrees, at most
+    /// [`MAX_DEGREES`](Self::MAX_DEGREES). Our sun has 0.53.
+    Degrees(f32),
+    /// The diameter of a spot or point light, metres, at most [`MAX_METRES`](Self::MAX_METRES).
+    Metres(f32),
+}
+
+/// Our sun's.
+impl Default for LightSize {
+    fn default() -> Self {
+        Self::Degrees(0.53)
+    }
+}
+
+impl LightSize {
+    /// The widest sun, degrees.
+    pub const MAX_DEGREES: f32 = 90.0;
+
+    /// The largest lamp, metres.
+    pub const MAX_METRES: f32 = 1e6;
+
+    /// The light's diameter: of a lamp in metres, of a sun in metres per metre of distance (twice the
+    /// tangent of half its angle).
+    pub fn diameter(self) -> f32 {
+        match self {
+            Self::Degrees(angle) => 2.0 * (0.5 * angle).to_radians().tan(),
+            Self::Metres(diameter) => diameter,
+        }
+    }
+
+    pub(crate) fn check(self) -> Result<(), Error> {
+        let (size, max, unit) = match self {
+            Self::Degrees(size) => (size, Self::MAX_DEGREES, "degrees"),
+            Self::Metres(size) => (size, Self::MAX_METRES, "metres"),
+        };
+        check(size > 0.0 && size <= max, "filter.light", || {
+            format!("must be above 0 and at most {max} {unit}, is {size}")
+        })
+    }
+}
+
+/// As in a technique's text: `0.53deg`, `0.2m`.
+impl fmt::Display for LightSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Degrees(size) => write!(f, "{size}deg"),
+            Self::Metres(size) => write!(f, "{size}m"),
         }
     }
 }

@@ -1,5 +1,5 @@
 use super::{OnePoint, Seen};
-use crate::options::Objective;
+use crate::technique::Objective;
 
 /// The strength ν = μ/λ of least error over the points seen.
 ///

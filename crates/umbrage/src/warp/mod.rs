@@ -10,7 +10,7 @@ pub(crate) use psm::psm;
 
 use crate::camera::Camera;
 use crate::math::range;
-use crate::options::Warp;
+use crate::technique::Warp;
 use glam::{DMat3, DVec2, DVec3};
 
 /// Strengths beyond this have no digits left.
@@ -111,7 +111,7 @@ impl OnePoint {
         camera: &Camera,
     ) -> f64 {
         let strength = match warp {
-            Warp::Unfocused | Warp::Stable | Warp::Uniform | Warp::Psm => 0.0,
+            Warp::Uniform | Warp::Psm => 0.0,
             Warp::Lambda(lambda) => self.mu / lambda,
             Warp::Adaptive(objective) => {
                 // As the view turns into the light z swings around, and what is best for one z is

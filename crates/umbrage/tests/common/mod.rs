@@ -4,23 +4,43 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Faces, Light, LookAt, Objective, Options, Partition, Plane, PointLight,
-    Size, Splits, SpotLight, Warp,
+    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, Objective, Partition, Plane,
+    Planner, PointLight, Splits, SpotLight, Technique, Warp,
 };
 
-/// Every warp, by name.
-pub(crate) const WARPS: [(&str, Warp); 11] = [
-    ("unfocused", Warp::Unfocused),
-    ("stable", Warp::Stable),
-    ("uniform", Warp::Uniform),
-    ("psm", Warp::Psm),
-    ("lispsm", Warp::Lispsm),
-    ("tsm", Warp::Tsm { focus: None }),
-    ("tsm(focus)", Warp::Tsm { focus: Some(3.0) }),
-    ("adaptive", Warp::Adaptive(Objective::Storage)),
-    ("adaptive(area)", Warp::Adaptive(Objective::Area)),
-    ("log", Warp::Log),
-    ("lambda=7", Warp::Lambda(7.0)),
+/// How a map's texels are spread, and over what.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spread {
+    pub warp: Warp,
+    pub cover: Cover,
+}
+
+impl From<Warp> for Spread {
+    fn from(warp: Warp) -> Self {
+        seen(warp)
+    }
+}
+
+const fn seen(warp: Warp) -> Spread {
+    Spread { warp, cover: Cover::Seen }
+}
+
+pub(crate) const SCENE: Spread = Spread { warp: Warp::Uniform, cover: Cover::Scene };
+pub(crate) const STABLE: Spread = Spread { warp: Warp::Uniform, cover: Cover::Stable };
+
+/// Every warp and every cover, by name.
+pub(crate) const WARPS: [(&str, Spread); 11] = [
+    ("unfocused", SCENE),
+    ("stable", STABLE),
+    ("uniform", seen(Warp::Uniform)),
+    ("psm", seen(Warp::Psm)),
+    ("lispsm", seen(Warp::Lispsm)),
+    ("tsm", seen(Warp::Tsm { focus: None })),
+    ("tsm(focus)", seen(Warp::Tsm { focus: Some(3.0) })),
+    ("adaptive", seen(Warp::Adaptive(Objective::Storage))),
+    ("adaptive(area)", seen(Warp::Adaptive(Objective::Area))),
+    ("log", seen(Warp::Log)),
+    ("lambda=7", seen(Warp::Lambda(7.0))),
 ];
 
 #[derive(Clone, Debug)]
@@ -30,8 +50,15 @@ pub(crate) struct Config {
     pub bounds: Bounds<'static>,
 }
 
-pub(crate) fn options(warp: Warp) -> Options {
-    Options { warp, size: Size::Budget(1 << 20), max_side: 1 << 16, ..Options::default() }
+/// One map of 1024² texels.
+pub(crate) fn technique(spread: impl Into<Spread>) -> Technique {
+    let Spread { warp, cover } = spread.into();
+    Technique { warp, cover, ..Technique::default() }
+}
+
+/// A planner for devices that allow long sides.
+pub(crate) fn planner() -> Planner {
+    Planner::with_limits(Limits { max_side: 1 << 16, ..Limits::default() })
 }
 
 pub(crate) fn direction() -> impl Strategy<Value = DVec3> {
@@ -97,9 +124,9 @@ pub(crate) fn partition() -> impl Strategy<Value = Partition> {
     prop_oneof![1 => Just(Partition::default()), 2 => some]
 }
 
-/// `partition`, or as much of it as this warp can have.
-pub(crate) fn possible(partition: Partition, warp: Warp) -> Partition {
-    if warp != Warp::Stable {
+/// `partition`, or as much of it as this cover can have.
+pub(crate) fn possible(partition: Partition, spread: Spread) -> Partition {
+    if spread != STABLE {
         return partition;
     }
     let is_fitted = partition.splits == Splits::Fitted;

@@ -73,6 +73,16 @@ impl Csm {
         self.leak
     }
 
+    /// How much the higher terms are damped: α.
+    pub fn attenuation(&self) -> f32 {
+        self.attenuation
+    }
+
+    /// Whether lit surfaces are made bright by an offset, and whether by doubling.
+    pub(crate) fn brightening(&self) -> [bool; 2] {
+        [self.offset, self.scale]
+    }
+
     /// M.
     pub fn order(&self) -> u32 {
         self.order

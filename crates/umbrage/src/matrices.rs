@@ -8,15 +8,15 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 /// Scales and moves a homography's s and t so that what is seen fills [0, 1]², and w so that its
 /// least value is 1. `None` if w is not positive everywhere, by rounding where distances differ by many
 /// orders of magnitude.
-pub(crate) fn fit(homography: DMat3, seen: &[Seen]) -> Option<DMat3> {
+pub(crate) fn filling_unit_square(homography: DMat3, seen: &[Seen]) -> Option<DMat3> {
     let [s, t, w] = [0, 1, 2].map(|i| homography.row(i));
     let value = |row: DVec3, p: &Seen| row.dot(p.xz.extend(1.0));
     let (least_w, _) = range(seen.iter().map(|p| value(w, p)));
-    let fit = |row: DVec3| {
+    let filling = |row: DVec3| {
         let (lo, hi) = range(seen.iter().map(|p| value(row, p) / value(w, p)));
         (row - w * lo) / ((hi - lo).max(1e-12 * hi.abs().max(lo.abs())) * least_w)
     };
-    (least_w > 0.0).then(|| DMat3::from_cols(fit(s), fit(t), w / least_w).transpose())
+    (least_w > 0.0).then(|| DMat3::from_cols(filling(s), filling(t), w / least_w).transpose())
 }
 
 /// Which light-space y have depths 0 and 1 where w is 1, metres (for spot lights in units of light-space

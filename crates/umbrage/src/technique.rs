@@ -1,63 +1,117 @@
+//! Techniques: what a plan is made by.
+
+mod code;
+mod filters;
+pub mod language;
+mod layouts;
+
 use crate::error::{Error, check};
 use crate::plan::Face;
+use crate::visibility::Filter;
 
-/// How to lay out a light's shadow maps.
+/// One way to make shadows: which maps there are, how their texels are spread, and how they are
+/// looked up.
+///
+/// A technique is also a text, `WARP[+zK][+face][:FILTER][@TEXELS]`, which parses and prints both
+/// ways; [`language`] lists its words:
+///
+/// ```
+/// use umbrage::{Partition, Size, Technique, visibility::Filter};
+///
+/// let technique: Technique = "adaptive+z4:pcf3@2048".parse()?;
+/// assert_eq!(technique, Technique {
+///     partition: Partition::slices(4),
+///     filter: Filter::Pcf { n: 3 },
+///     size: Size::Budget(2048 * 2048),
+///     ..Technique::default()
+/// });
+/// assert_eq!(technique.to_string(), "adaptive+z4:pcf3@2048");
+/// # Ok::<(), umbrage::language::ParseError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// How texels are spread over what each map serves.
+pub struct Technique {
+    /// How texels are spread over what each map covers.
     pub warp: Warp,
+    /// What each map covers.
+    pub cover: Cover,
     /// Which maps there are.
     pub partition: Partition,
+    /// How the maps are looked up. The plan leaves room around them for what the filter reads, and
+    /// keeps the depths of distant casters where the filter asks for these.
+    pub filter: Filter,
     /// How many texels there are.
     pub size: Size,
+}
+
+impl Default for Technique {
+    /// One `adaptive` map of 1024² texels with `hard` lookups.
+    fn default() -> Self {
+        Self {
+            warp: Warp::Adaptive(Objective::Storage),
+            cover: Cover::default(),
+            partition: Partition::default(),
+            filter: Filter::default(),
+            size: Size::Budget(1024 * 1024),
+        }
+    }
+}
+
+/// What the device can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
     /// The longest side that the device allows a texture, texels, 1 ..= 65536.
     pub max_side: u32,
     /// Sides of maps are multiples of this, texels, 1 ..= `max_side`.
     pub align: u32,
-    /// Whether depths begin where the casters do rather than where the receivers do. Casters nearer the light are flattened otherwise, which shadow tests do not
-    /// mind; but maps then do not tell how far they lie, as soft shadows ask. It costs depth some of its digits, so there is an end: 1000 times the receivers' range of
-    /// depth, and a sixteenth of their distance from a lamp. Without known [casters](crate::Bounds::casters) it changes nothing.
-    pub keeps_casters: bool,
-    /// How far filters look beyond what a map serves, texels ([`Filter::reach_texels`](crate::visibility::Filter::reach_texels)): what casts there counts as a
-    /// [caster](crate::ShadowMap::may_cast) too.
-    pub reach_texels: u32,
 }
 
-impl Default for Options {
-    /// One `adaptive` map, 1024² texels, sides up to WebGPU's guaranteed 8192.
+impl Default for Limits {
+    /// Sides up to WebGPU's guaranteed 8192, of any number of texels.
     fn default() -> Self {
-        Self {
-            warp: Warp::Adaptive(Objective::Storage),
-            partition: Partition::default(),
-            size: Size::Budget(1024 * 1024),
-            max_side: 8192,
-            align: 1,
-            keeps_casters: false,
-            reach_texels: 0,
-        }
+        Self { max_side: 8192, align: 1 }
+    }
+}
+
+/// What a map covers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cover {
+    /// The receivers that the camera sees in the map's part of the view.
+    #[default]
+    Seen,
+    /// All of the scene's bounds, whatever the camera sees: where everyone starts. Without bounds,
+    /// the view frustum's bounding sphere. For [`Warp::Uniform`] alone.
+    Scene,
+    /// The bounding sphere of the map's part of the view frustum, whatever receivers there are. The
+    /// map is stable: its texels keep their places and their size in the world however the camera
+    /// moves or turns, since the map moves by whole texels. So shadows do not shimmer. Under spot
+    /// and point lights it covers all that the light shines on. For [`Warp::Uniform`] alone, not
+    /// with partitions by face, nor with [`Splits::Fitted`]; a map needs at least 2 × 2 texels.
+    Stable,
+}
+
+impl Cover {
+    /// Whether maps stay as they are whatever is seen of what they cover.
+    pub(crate) fn is_fixed(self) -> bool {
+        self != Self::Seen
+    }
+
+    /// Of a side's texels, those that only leave room to move by whole texels.
+    pub(crate) fn spare_texels(self) -> u32 {
+        u32::from(self == Self::Stable)
     }
 }
 
 /// How texels are spread over what a map serves.
 ///
-/// All but `Unfocused`, `Stable`, `Uniform` and `Psm` are one-point perspectives along light space's z axis and
-/// differ in λ alone, the distance from the centre of projection to the near plane. All but
-/// `Unfocused`, `Stable` and `Lambda` become `Uniform` smoothly as the view turns into the light. Along the light
-/// itself z has no direction to follow: as the view sweeps past, the map turns half around within
-/// the angle by which it misses, `Uniform`'s too.
+/// All but `Uniform` and `Psm` are one-point perspectives along light space's z axis and differ in λ
+/// alone, the distance from the centre of projection to the near plane. All but `Lambda` become
+/// `Uniform` smoothly as the view turns into the light. Along the light itself z has no direction to
+/// follow: as the view sweeps past, the map turns half around within the angle by which it misses,
+/// `Uniform`'s too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warp {
-    /// One even map around all of the scene's bounds, whatever the camera sees: where everyone
-    /// starts. Without bounds, around the view frustum's bounding sphere.
-    Unfocused,
-    /// An even map that stands still in the world: its texels keep their places and their size however
-    /// the camera moves or turns, so that shadows do not shimmer. It covers the bounding sphere of its
-    /// part of the view frustum, whatever receivers there are, and moves by whole texels. Under spot
-    /// and point lights it covers all that the light shines on. Not for partitions by face, nor with
-    /// [`Splits::Fitted`]; a map needs at least 2 × 2 texels.
-    Stable,
-    /// An even map focused on the receivers that the camera sees.
+    /// No warp: texels are spread evenly over the light plane.
     Uniform,
     /// Perspective shadow maps (Stamminger and Drettakis 2002): the map looks from the light at the
     /// world as it is after the viewer's own perspective. The depth stored is the light's own,
@@ -132,7 +186,7 @@ impl Default for Partition {
 }
 
 /// Where slices along the view meet. n and f are the nearest and farthest view distance of the
-/// receivers seen; for [`Warp::Stable`] the camera's own.
+/// receivers seen; for [`Cover::Stable`] the camera's own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Splits {
@@ -174,64 +228,83 @@ pub enum Size {
     MaxError(f64),
 }
 
-impl Options {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        check((1..=65536).contains(&self.max_side), "options.max_side", || {
-            format!("must be 1 to 65536 texels, is {}", self.max_side)
-        })?;
-        check((1..=self.max_side).contains(&self.align), "options.align", || {
-            format!("must be 1 to max_side ({}) texels, is {}", self.max_side, self.align)
-        })?;
+impl Technique {
+    /// That every value makes sense, and that they go together. A [`Planner`](crate::Planner) checks
+    /// this itself.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn check(&self) -> Result<(), Error> {
         match self.size {
             Size::Budget(texels) => {
-                check((1..=1 << 32).contains(&texels), "options.size", || {
+                check((1..=1 << 32).contains(&texels), "technique.size", || {
                     format!("must be a budget of 1 to 2^32 texels, is {texels}")
                 })?;
             }
-            Size::Exact(size) => {
-                check(
-                    size.iter().all(|n| (1..=self.max_side).contains(n) && n % self.align == 0),
-                    "options.size",
-                    || {
-                        format!(
-                            "must be multiples of {} from {0} to {} texels each way, is {}x{}",
-                            self.align, self.max_side, size[0], size[1]
-                        )
-                    },
-                )?;
-            }
+            Size::Exact(size) => check(!size.contains(&0), "technique.size", || {
+                format!("must have texels each way, is {}x{}", size[0], size[1])
+            })?,
             Size::MaxError(pixels) => {
-                check(pixels > 0.0 && pixels.is_finite(), "options.size", || {
+                check(pixels > 0.0 && pixels.is_finite(), "technique.size", || {
                     format!("must be an error of more than 0 pixels per texel, is {pixels}")
                 })?;
             }
         }
         match self.warp {
-            Warp::Lambda(lambda) => check(lambda > 0.0, "options.warp.lambda", || {
+            Warp::Lambda(lambda) => check(lambda > 0.0, "technique.warp.lambda", || {
                 format!("must be a positive distance, is {lambda}")
             })?,
             Warp::Tsm { focus: Some(focus) } => {
-                check(focus > 0.0 && focus.is_finite(), "options.warp.focus", || {
+                check(focus > 0.0 && focus.is_finite(), "technique.warp.focus", || {
                     format!("must be a positive, finite distance, is {focus}")
                 })?;
             }
-            Warp::Stable => {
-                check(self.partition.faces == Faces::Whole, "options.partition.faces", || {
-                    "stable maps do not turn with the view: they cannot serve its faces".into()
-                })?;
-                check(self.partition.splits != Splits::Fitted, "options.partition.splits", || {
-                    "stable maps cannot be fitted to what is seen: take other splits".into()
-                })?;
-                let is_point = matches!(self.size, Size::Exact(size) if size.contains(&1));
-                check(
-                    !is_point && self.max_side / self.align * self.align >= 2,
-                    "options.size",
-                    || "a stable map needs at least 2 texels each way".into(),
-                )?;
-            }
             _ => {}
         }
-        self.partition.check()
+        check(!self.cover.is_fixed() || self.warp == Warp::Uniform, "technique.cover", || {
+            "only maps that are not warped can cover more than the receivers seen: take Warp::Uniform"
+                .into()
+        })?;
+        if self.cover == Cover::Stable {
+            check(self.partition.faces == Faces::Whole, "technique.partition.faces", || {
+                "stable maps do not turn with the view: they cannot serve its faces".into()
+            })?;
+            check(self.partition.splits != Splits::Fitted, "technique.partition.splits", || {
+                "stable maps cannot be fitted to what is seen: take other splits".into()
+            })?;
+            let is_line = matches!(self.size, Size::Exact(size) if size.contains(&1));
+            check(!is_line, "technique.size", || {
+                "a stable map needs at least 2 texels each way".into()
+            })?;
+        }
+        self.partition.check()?;
+        self.filter.check()
+    }
+}
+
+impl Limits {
+    /// That the limits make sense, and that maps of a technique keep within them.
+    pub(crate) fn check(&self, technique: &Technique) -> Result<(), Error> {
+        let Self { max_side, align } = *self;
+        check((1..=65536).contains(&max_side), "limits.max_side", || {
+            format!("must be 1 to 65536 texels, is {max_side}")
+        })?;
+        check((1..=max_side).contains(&align), "limits.align", || {
+            format!("must be 1 to max_side ({max_side}) texels, is {align}")
+        })?;
+        if let Size::Exact(size) = technique.size {
+            let fits = |n: &u32| (1..=max_side).contains(n) && n.is_multiple_of(align);
+            check(size.iter().all(fits), "technique.size", || {
+                format!(
+                    "must be multiples of {align} from {align} to {max_side} texels each way, is {}x{}",
+                    size[0], size[1]
+                )
+            })?;
+        }
+        let most = max_side / align * align;
+        check(most > technique.cover.spare_texels(), "technique.size", || {
+            "a stable map needs at least 2 texels each way".into()
+        })
     }
 }
 
@@ -239,15 +312,15 @@ impl Partition {
     fn check(&self) -> Result<(), Error> {
         check(
             (1..=Self::MAX_SLICES as u32).contains(&self.slices),
-            "options.partition.slices",
+            "technique.partition.slices",
             || format!("must be 1 to {}, is {}", Self::MAX_SLICES, self.slices),
         )?;
-        check((0.0..=1.0).contains(&self.overlap), "options.partition.overlap", || {
+        check((0.0..=1.0).contains(&self.overlap), "technique.partition.overlap", || {
             format!("must be a share of 0 to 1, is {}", self.overlap)
         })?;
         match self.splits {
             Splits::Practical(blend) => {
-                check((0.0..=1.0).contains(&blend), "options.partition.splits", || {
+                check((0.0..=1.0).contains(&blend), "technique.partition.splits", || {
                     format!("must be a blend of 0 (even) to 1 (self-similar), is {blend}")
                 })
             }
@@ -256,7 +329,7 @@ impl Partition {
                 check(
                     used.iter().all(|d| (1e-12..=1e12).contains(d))
                         && used.windows(2).all(|w| w[0] < w[1]),
-                    "options.partition.splits",
+                    "technique.partition.splits",
                     || {
                         format!(
                             "must be {} ascending distances of 1e-12 to 1e12 metres, are {used:?}",

@@ -1,0 +1,146 @@
+//! From drafts to maps: their resolution, and all that follows from it.
+
+use super::draft::Draft;
+use crate::aliasing::Local;
+use crate::bounds::{Aabb, Bounds};
+use crate::camera::Camera;
+use crate::error::Error;
+use crate::focus::Body;
+use crate::math::range;
+use crate::matrices::MARGIN_TEXELS;
+use crate::plan::{ShadowMap, Slab};
+use crate::resolution::enlarged;
+use crate::slab::{all_distances, distances, slab};
+use crate::technique::{Limits, Size, Technique};
+use crate::worst::{self, worst_errors};
+use glam::{DVec2, DVec3};
+
+/// Casters that lie farther before the receivers than this many of their ranges of depth are flattened in any case: the receivers' own depths need the digits.
+const MOST_CASTER_DEPTHS: f64 = 1000.0;
+
+/// Casters so many times nearer to a lamp than where the receivers' depths begin are flattened in any case: before a lamp there is no end to depth.
+const CLOSEST_TO_LAMP: f64 = 16.0;
+
+/// Checked input.
+#[derive(Clone, Copy)]
+pub(super) struct Finish<'a> {
+    pub(super) camera: &'a Camera,
+    pub(super) bounds: &'a Bounds<'a>,
+    pub(super) technique: &'a Technique,
+    pub(super) limits: Limits,
+}
+
+/// Buffers kept from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Finishing {
+    worst: worst::Buffers,
+    casters: Body,
+    /// (s, t, depth) of a body's corners.
+    corners: Vec<DVec3>,
+}
+
+/// How wide a texel is, and how much that is in depth, laid along the beam.
+struct Texel {
+    metres: f64,
+    depth: f64,
+}
+
+impl Finishing {
+    /// The largest texel at the body's corners, which are kept.
+    fn texels(&mut self, map: &ShadowMap, body: &Body) -> Texel {
+        self.corners.clear();
+        let mut largest = Texel { metres: 0.0, depth: 0.0 };
+        for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
+            let metres = local.footprint().longest();
+            largest.metres = largest.metres.max(metres);
+            largest.depth = largest.depth.max(metres * local.depth_per_metre);
+            self.corners.push(local.shadow);
+        }
+        largest
+    }
+
+    /// How far before depth 0 the first of what can cast into a map lies, in depth, ≥ 0.
+    fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
+        let body = &mut self.casters;
+        body.set_box(draft.body.sides(casters.relative_to(map.origin)));
+        // What a stable map holds must not depend on the view.
+        if draft.stable.is_none() {
+            map.caster_planes.iter().for_each(|&p| body.clip(p));
+        }
+        let depth = |&v: &DVec3| {
+            let h = map.shadow_from_local * v.extend(1.0);
+            if h.w > 0.0 { h.z / h.w } else { f64::NEG_INFINITY }
+        };
+        let (nearest, _) = range(body.vertices().iter().map(depth));
+        if body.is_empty() {
+            return 0.0;
+        }
+        let [begin, step] = map.beam_scale(DVec2::splat(0.5));
+        // Distances from a lamp go with one over the fourth coordinate.
+        let most = if step == 0.0 {
+            MOST_CASTER_DEPTHS
+        } else {
+            ((CLOSEST_TO_LAMP - 1.0) * begin / -step).clamp(0.0, MOST_CASTER_DEPTHS)
+        };
+        (-nearest).clamp(0.0, most)
+    }
+
+    /// Gives a map its resolution and all that follows from it.
+    pub(super) fn finish(
+        &mut self,
+        map: &mut ShadowMap,
+        draft: &Draft,
+        size: [u32; 2],
+        request: &Finish<'_>,
+    ) -> Result<(), Error> {
+        let Finish { camera, bounds, technique, limits } = *request;
+        if draft.body.is_empty() {
+            map.resolution = [0, 0];
+            return Ok(());
+        }
+        let mut margin = 0.0;
+        let mut set = |map: &mut ShadowMap, size: [u32; 2]| {
+            map.resolution = size;
+            if let Some(stable) = &draft.stable {
+                margin = stable.place(map);
+            }
+            map.error = worst_errors(map, &draft.body, camera, &mut self.worst);
+        };
+        set(map, size);
+        if let Size::MaxError(wanted) = technique.size {
+            // Sizes come from errors in s and t at the body's corners. The worst direction may be another.
+            // Rounding alone is no reason: a stable map's size would change with the view.
+            while map.error.max > wanted * (1.0 + 1e-9) {
+                let larger = enlarged(technique, limits, map.resolution, map.error.max / wanted)?;
+                set(map, larger);
+            }
+        }
+        let texel = self.texels(map, &draft.body);
+        // What casts where the filter reads beyond the map counts too.
+        let reach = f64::from(technique.filter.reach_texels()) * texel.metres;
+        map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
+        if draft.stable.is_none() {
+            margin = MARGIN_TEXELS * texel.depth;
+        }
+        let earlier = match bounds.casters.filter(|_| technique.filter.keeps_casters()) {
+            Some(casters) => margin.max(self.nearest_caster(map, draft, casters)),
+            None => margin,
+        };
+        map.begin_earlier(earlier);
+        let is_fixed = technique.cover.is_fixed();
+        map.slab = match map.apex {
+            Some(apex) if is_fixed => all_distances(map, apex),
+            Some(apex) => distances(map, apex, &draft.body, texel.metres),
+            None if is_fixed => Slab::default(),
+            None => {
+                let scale = 1.0 / (1.0 + earlier);
+                self.corners.iter_mut().for_each(|c| c.z = (c.z + earlier) * scale);
+                slab(&self.corners, texel.depth * scale)
+            }
+        };
+        let height = f64::from(camera.image()[1]);
+        map.storage_factor =
+            map.error.max_s * map.error.max_t * map.texels() as f64 / (height * height);
+        Ok(())
+    }
+}

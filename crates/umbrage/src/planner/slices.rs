@@ -1,0 +1,125 @@
+//! The maps of a part of the view: one for each of its slices.
+
+use super::{Draft, Planner, Request};
+use crate::bounds::Plane;
+use crate::casters::caster_planes;
+use crate::focus::Body;
+use crate::math::range;
+use crate::partition::{self, Along};
+use crate::plan::{Face, Part, ShadowMap};
+use crate::stable::Stable;
+use crate::technique::{Cover, Partition, Warp};
+use crate::warp::LightSpace;
+use glam::DVec2;
+
+/// Buffers kept from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Slicing {
+    /// What a slice that is only tried serves, and its map.
+    body: Body,
+    trial: ShadowMap,
+    outline: Vec<DVec2>,
+}
+
+/// How a part of the view is sliced.
+struct Slices<'a> {
+    part: Part,
+    along: &'a Along,
+    partition: Partition,
+    warp: Warp,
+    /// Where slices begin and end, metres along the view.
+    ends: partition::Ends,
+}
+
+impl Planner {
+    /// Appends the maps of all slices of the part whose body is `self.bodies.face`.
+    pub(super) fn draft_slices(&mut self, part: Part, along: &Along, request: &Request<'_>) {
+        let technique = request.technique;
+        let (mut partition, mut warp) = (technique.partition, technique.warp);
+        if part.face == Some(Face::Near) {
+            // All its pixels are of one size.
+            partition.slices = 1;
+            if !matches!(warp, Warp::Adaptive(_)) {
+                warp = Warp::Uniform;
+            }
+        }
+        let ends = self.slice_ends(&partition, along, warp, request);
+        let slices = Slices { part, along, partition, warp, ends };
+        for slice in 0..partition.slices as usize {
+            self.draft_slice(slice, &slices, request);
+        }
+    }
+
+    /// Where slices begin and end.
+    fn slice_ends(
+        &mut self,
+        partition: &Partition,
+        along: &Along,
+        warp: Warp,
+        request: &Request<'_>,
+    ) -> partition::Ends {
+        let Request { camera, technique, .. } = *request;
+        let (body, Slicing { body: slice, trial, .. }) = (&self.bodies.face, &mut self.slicing);
+        let [n, f] = if technique.cover == Cover::Stable || body.is_empty() {
+            [camera.near(), camera.far()]
+        } else {
+            let depths = body.vertices().iter().map(|&v| along.depth_of(v, camera));
+            range(depths.map(|d| d.clamp(camera.near(), camera.far()))).into()
+        };
+        partition::split(partition, [n, f], |from, to| {
+            slice.copy_from(body);
+            let begin = (from > n).then(|| along.plane_at(from, camera)).flatten();
+            let end = (to < f).then(|| along.plane_at(to, camera)).flatten();
+            begin.into_iter().chain(end.map(Plane::flipped)).for_each(|p| slice.clip(p));
+            trial.clear(camera);
+            let [s, t] = self.drafting.draft(trial, slice, along, warp, true, request);
+            s * t
+        })
+    }
+
+    /// Appends the map of one slice.
+    fn draft_slice(&mut self, slice: usize, slices: &Slices<'_>, request: &Request<'_>) {
+        let Slices { part, along, partition, warp, ends } = slices;
+        let Request { camera, technique, .. } = *request;
+        let index = self.units.len();
+        if self.plan.maps.len() == index {
+            self.plan.maps.push(ShadowMap::default());
+        }
+        if self.drafts.len() == index {
+            self.drafts.push(Draft::default());
+        }
+        let (map, draft) = (&mut self.plan.maps[index], &mut self.drafts[index]);
+        map.clear(camera);
+        map.part = Part { slice, ..*part };
+        let split = [ends[slice], ends[slice + 1]];
+        map.split = split;
+        let is_last = slice + 1 == partition.slices as usize;
+        let overlap = if is_last { 0.0 } else { partition.overlap };
+        let reach = split[1] + overlap * (split[1] - split[0]).max(0.0);
+        let before = |depth| along.plane_at(depth, camera).map(Plane::flipped);
+        // The first slice begins and the last one ends where what is served does.
+        let end = before(reach).filter(|_| !is_last);
+        let begin = along.plane_at(split[0], camera).filter(|_| slice > 0);
+        draft.body.copy_from(&self.bodies.face);
+        begin.into_iter().chain(end).for_each(|p| draft.body.clip(p));
+        map.fade_from = before(split[1]).filter(|_| overlap > 0.0);
+        map.cell.extend(end.into_iter().chain(begin));
+        map.cell.extend_from_slice(&self.cell);
+        map.cell.push(Plane { normal: -camera.forward(), offset: camera.far() });
+        draft.stable = (technique.cover == Cover::Stable).then(|| {
+            let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
+            Stable::around(request.lamp, camera, range)
+        });
+        let unit = match &draft.stable {
+            None => self.drafting.draft(map, &draft.body, along, *warp, false, request),
+            // Beyond the view nothing is ever served.
+            Some(_) if split[0] >= camera.far() || reach <= camera.near() => [0.0; 2],
+            Some(stable) => stable.unit_errors(),
+        };
+        self.units.push(unit);
+        let around = self.around.iter().chain(&map.cell).copied();
+        let space = LightSpace::fixed(request.lamp, camera);
+        let outline = &mut self.slicing.outline;
+        caster_planes(&mut map.caster_planes, around, &draft.body, &space, outline);
+    }
+}
