@@ -517,10 +517,10 @@ fn lamps_end_where_the_file_says_and_shadows_begin_nearby() {
     })
     .unwrap();
     for light in &scene.lights {
-        let options = umbrage::Options::default();
+        let technique = umbrage::Technique::default();
         let mut planner = umbrage::Planner::new();
         let bounds = umbrage::Bounds::of_scene(scene.bounds());
-        let plan = planner.plan(&camera, &[light.light], &bounds, &options);
+        let plan = planner.plan(&camera, &[light.light], &bounds, &technique);
         assert!(plan.is_ok(), "{:?}: {plan:?}", light.light);
     }
 }
