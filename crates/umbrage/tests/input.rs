@@ -165,14 +165,14 @@ fn techniques_name_what_is_wrong() {
         (pcss(LightSize::Degrees(91.0)), "filter.light"),
     ];
     for (technique, expected) in cases {
-        let result = planner().plan(&camera, &[SUN], &Bounds::default(), &technique).cloned();
+        let result = Planner::new().plan(&camera, &[SUN], &Bounds::default(), &technique).cloned();
         assert_eq!(field(result), expected, "{technique:?}");
         // No light, no excuse.
-        let result = planner().plan(&camera, &[], &Bounds::default(), &technique).cloned();
+        let result = Planner::new().plan(&camera, &[], &Bounds::default(), &technique).cloned();
         assert_eq!(field(result), expected, "{technique:?}");
     }
     // What is not used may be anything.
-    planner().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
+    Planner::new().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
 }
 
 #[test]
