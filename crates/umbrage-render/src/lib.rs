@@ -20,3 +20,9 @@ pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Look, Renderer};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
 pub use timer::Timer;
+
+/// The README's examples are tests. They are here, because this crate stays in the repository: the
+/// crates that they are about are also published, where there is no such file.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

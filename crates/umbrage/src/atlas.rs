@@ -261,8 +261,8 @@ impl Boxes {
         for &i in order {
             let [w, h] = self.list[i].1;
             let place = allocator.allocate(size2(int(w), int(h)))?;
-            packing.corners[i] = place.min.to_array().map(i32::cast_unsigned);
-            let end = place.max.to_array().map(i32::cast_unsigned);
+            packing.corners[i] = place.min.to_array().map(|texel| texel as u32);
+            let end = place.max.to_array().map(|texel| texel as u32);
             packing.size = [packing.size[0].max(end[0]), packing.size[1].max(end[1])];
         }
         Some(packing)

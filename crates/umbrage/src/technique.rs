@@ -293,7 +293,7 @@ impl Limits {
             format!("must be 1 to max_side ({max_side}) texels, is {align}")
         })?;
         if let Size::Exact(size) = technique.size {
-            let fits = |n: &u32| (1..=max_side).contains(n) && n.is_multiple_of(align);
+            let fits = |n: &u32| (1..=max_side).contains(n) && n % align == 0;
             check(size.iter().all(fits), "technique.size", || {
                 format!(
                     "must be multiples of {align} from {align} to {max_side} texels each way, is {}x{}",

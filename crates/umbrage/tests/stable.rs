@@ -159,7 +159,7 @@ proptest! {
                     let moved = a.unwrap() - b.unwrap();
                     let steps = moved / DVec3::new(1.0, 1.0, depth_step);
                     let off = (steps - steps.round()).abs();
-                    let slack = DVec3::new(texel[0], texel[1], texel[0]).map(|t| 1e-6 + rounding / t);
+                    let slack = 1e-6 + rounding / DVec3::new(texel[0], texel[1], texel[0]);
                     prop_assert!(off.cmple(slack).all(), "{steps}: off by {off}, not {slack}");
                 }
             }

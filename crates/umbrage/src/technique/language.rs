@@ -203,9 +203,7 @@ impl FromStr for Technique {
 
     fn from_str(text: &str) -> Result<Self, ParseError> {
         let Parts { warp, partitions, filter, size } = Parts::of(text);
-        if let Some(size) = size
-            && size.contains([':', '+'])
-        {
+        if let Some(size) = size.filter(|size| size.contains([':', '+'])) {
             return Err(ParseError::new(format!(
                 "`@{size}`: `@TEXELS` comes last, as in `uniform:pcf3@1024`"
             )));
