@@ -50,6 +50,10 @@ pub enum ClipDepth {
     MinusOneToOne,
 }
 
+/// Fields of the input to [`Camera::from_matrices`], for its errors.
+const POSE: &str = "camera.world_from_view";
+const PROJECTION: &str = "camera.clip_from_view";
+
 impl Camera {
     /// A symmetrical view from `eye` towards `target`.
     ///
@@ -109,8 +113,6 @@ impl Camera {
         shadow_distance: Option<f64>,
         image: [u32; 2],
     ) -> Result<Self, Error> {
-        const POSE: &str = "camera.world_from_view";
-        const PROJECTION: &str = "camera.clip_from_view";
         check_image(image)?;
         check(world_from_view.is_finite(), POSE, || "has entries that are not finite".into())?;
         check(clip_from_view.is_finite(), PROJECTION, || "has entries that are not finite".into())?;
@@ -141,44 +143,7 @@ impl Camera {
         check(x.x > 0.0 && y.y > 0.0, PROJECTION, || {
             "must keep x to the right and y up: flip the picture elsewhere".into()
         })?;
-        // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d). Solved for d, it gives both
-        // ends of the depth range.
-        let distance_of = |ndc: f64| z.w / (ndc * scale - z.z * sign);
-        let low = match clip_depth {
-            ClipDepth::ZeroToOne => 0.0,
-            ClipDepth::MinusOneToOne => -1.0,
-        };
-        let [a, b] = [distance_of(low), distance_of(1.0)];
-        // Because of rounding, an infinite far plane comes out either as ±∞ or as a huge
-        // distance of either sign.
-        let huge = 1e9 * a.abs().min(b.abs());
-        check([a, b].iter().all(|&d| d > 0.0 || d < -huge), PROJECTION, || {
-            format!("has its near and far plane at {a} and {b}, not both before the viewer")
-        })?;
-        let finite = |d: f64| d > 0.0 && d < huge.min(1e12);
-        let (near, far) = match (finite(a), finite(b)) {
-            (true, true) => (a.min(b), a.max(b)),
-            (true, false) => (a, f64::INFINITY),
-            (false, true) => (b, f64::INFINITY),
-            (false, false) => {
-                return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
-            }
-        };
-        let far = match shadow_distance {
-            None if far == f64::INFINITY => {
-                return Err(Error::invalid(
-                    "camera.shadow_distance",
-                    "is needed, because the projection has no far plane",
-                ));
-            }
-            None => far,
-            Some(d) => {
-                check(d > near, "camera.shadow_distance", || {
-                    format!("must exceed the near distance {near}, is {d}")
-                })?;
-                far.min(d)
-            }
-        };
+        let [near, far] = depth_range(z, w, clip_depth, shadow_distance)?;
         let slope = |ndc: DVec2| {
             DVec2::new((ndc.x * scale - x.z * sign) / x.x, (ndc.y * scale - y.z * sign) / y.y)
         };
@@ -339,4 +304,53 @@ fn check_image(image: [u32; 2]) -> Result<(), Error> {
     check(image.iter().all(|&n| (1..=65536).contains(&n)), "camera.image", || {
         format!("must be 1 to 65536 pixels each way, is {}x{}", image[0], image[1])
     })
+}
+
+/// The near and far distance of a projection with the rows `z` and `w`, metres.
+fn depth_range(
+    z: DVec4,
+    w: DVec4,
+    clip_depth: ClipDepth,
+    shadow_distance: Option<f64>,
+) -> Result<[f64; 2], Error> {
+    let (sign, scale) = (w.z.signum(), w.z.abs());
+    // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d). Solved for d, it gives both ends of
+    // the depth range.
+    let distance_of = |ndc: f64| z.w / (ndc * scale - z.z * sign);
+    let low = match clip_depth {
+        ClipDepth::ZeroToOne => 0.0,
+        ClipDepth::MinusOneToOne => -1.0,
+    };
+    let [a, b] = [distance_of(low), distance_of(1.0)];
+    // Because of rounding, an infinite far plane comes out either as ±∞ or as a huge distance of
+    // either sign.
+    let huge = 1e9 * a.abs().min(b.abs());
+    check([a, b].iter().all(|&d| d > 0.0 || d < -huge), PROJECTION, || {
+        format!("has its near and far plane at {a} and {b}, not both before the viewer")
+    })?;
+    let finite = |d: f64| d > 0.0 && d < huge.min(1e12);
+    let (near, far) = match (finite(a), finite(b)) {
+        (true, true) => (a.min(b), a.max(b)),
+        (true, false) => (a, f64::INFINITY),
+        (false, true) => (b, f64::INFINITY),
+        (false, false) => {
+            return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
+        }
+    };
+    let far = match shadow_distance {
+        None if far == f64::INFINITY => {
+            return Err(Error::invalid(
+                "camera.shadow_distance",
+                "is needed, because the projection has no far plane",
+            ));
+        }
+        None => far,
+        Some(d) => {
+            check(d > near, "camera.shadow_distance", || {
+                format!("must exceed the near distance {near}, is {d}")
+            })?;
+            far.min(d)
+        }
+    };
+    Ok([near, far])
 }

@@ -179,8 +179,7 @@ impl Body {
         let scale = self.size();
         // Vertices this close to the plane count as on it, so that no slivers arise from rounding.
         let tolerance = 1e-13 * scale.max(plane.offset.abs());
-        let Buffers { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
-            &mut self.buffers;
+        let distances = &mut self.buffers.distances;
         distances.clear();
         distances.extend(self.vertices.iter().map(|&v| {
             let d = plane.distance(v);
@@ -193,6 +192,18 @@ impl Body {
             self.clear();
             return;
         }
+        self.cut_faces();
+        self.buffers.close_cuts(plane);
+        let Buffers { vertices, faces, loops, .. } = &mut self.buffers;
+        std::mem::swap(&mut self.vertices, vertices);
+        std::mem::swap(&mut self.faces, faces);
+        std::mem::swap(&mut self.loops, loops);
+    }
+
+    /// Copies the inside parts of all faces to the buffers, and collects the edges along the cuts.
+    fn cut_faces(&mut self) {
+        let Buffers { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
+            &mut self.buffers;
         vertices.clear();
         faces.clear();
         loops.clear();
@@ -245,7 +256,13 @@ impl Body {
                 }
             }
         }
-        // Each polyhedron that was cut gets one new face.
+    }
+}
+
+impl Buffers {
+    /// Closes the polyhedra that `plane` cut, each with one new face.
+    fn close_cuts(&mut self, plane: Plane) {
+        let Self { rim, faces, loops, .. } = self;
         while let Some((first, mut at)) = rim.pop() {
             let start = loops.len();
             loops.push(first);
@@ -263,9 +280,6 @@ impl Body {
                 loops.truncate(start);
             }
         }
-        std::mem::swap(&mut self.vertices, vertices);
-        std::mem::swap(&mut self.faces, faces);
-        std::mem::swap(&mut self.loops, loops);
     }
 }
 
