@@ -83,10 +83,10 @@ impl Atlas {
         gutter_texels: u32,
         max_side: u32,
     ) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
-        let packing = boxes.pack().ok_or(boxes.too_large)?;
+        let rectangles = Rectangles::new(sizes, gutter_texels, max_side)?;
+        let packing = rectangles.pack().ok_or(rectangles.too_large)?;
         let mut places = vec![None; sizes.len()];
-        for (&(map, _), corner) in boxes.list.iter().zip(packing.corners) {
+        for (&(map, _), corner) in rectangles.list.iter().zip(packing.corners) {
             let origin = corner.map(|c| c + gutter_texels);
             places[map] = Some(Place { layer: 0, origin, size: sizes[map] });
         }
@@ -120,13 +120,13 @@ impl Atlas {
         gutter_texels: u32,
         max_side: u32,
     ) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
+        let rectangles = Rectangles::new(sizes, gutter_texels, max_side)?;
         let places = sizes.iter().zip(0..).map(|(&size, layer)| {
             let is_there = !size.contains(&0);
             is_there.then_some(Place { layer, origin: [gutter_texels; 2], size })
         });
         Ok(Self {
-            size: boxes.largest(),
+            size: rectangles.largest(),
             layers: sizes.len() as u32,
             gutter_texels,
             places: places.collect(),
@@ -163,7 +163,7 @@ fn slots(plan: &Plan) -> Vec<[u32; 2]> {
 }
 
 /// Rectangles to be packed.
-struct Boxes {
+struct Rectangles {
     /// Index of each map that is not empty, and its size including gutters.
     list: Vec<(usize, [u32; 2])>,
     max_side: u32,
@@ -187,7 +187,7 @@ impl Packing {
     }
 }
 
-impl Boxes {
+impl Rectangles {
     /// The maps with their gutters, or an error if one of them alone is too large.
     fn new(sizes: &[[u32; 2]], gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
         let with_gutters = |size: [u32; 2]| {
@@ -225,7 +225,7 @@ impl Boxes {
         // Widths range from half to twice the side of a square without gaps. With few maps more
         // widths are tried, because the shapes of few maps matter most.
         let side = (texels as f64).sqrt();
-        let steps = (PATIENCE / self.list.len()).clamp(2, 24) as i32;
+        let steps = (SEARCH_EFFORT / self.list.len()).clamp(2, 24) as i32;
         let widths = (-steps..=steps).map(|i| {
             let ratio = (f64::from(i) / f64::from(steps)).exp2();
             ((side * ratio).ceil() as u32).clamp(widest, self.max_side)
@@ -281,7 +281,7 @@ impl Boxes {
 const STRIP_COST: f64 = 0.02;
 /// Number of widths tried to each side of the square's, times the number of maps; the former is
 /// kept within 2 to 24.
-const PATIENCE: usize = 1024;
+const SEARCH_EFFORT: usize = 1024;
 /// The search distinguishes heights that differ by at least one part in this number.
 const FINENESS: u32 = 64;
 

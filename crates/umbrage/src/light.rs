@@ -65,21 +65,27 @@ impl Light {
 
     /// The projections that make up the light, each with its own maps: six pyramids for a point
     /// light, one projector for any other light. The light must have been [checked](Self::checked).
-    pub(crate) fn lamps(self) -> impl Iterator<Item = (Option<CubeSide>, Lamp)> {
+    pub(crate) fn projectors(self) -> impl Iterator<Item = (Option<CubeSide>, Projector)> {
         let is_point = matches!(self, Self::Point(_));
         (0..if is_point { 6 } else { 1 }).map(move |i| {
             let side = is_point.then(|| CubeSide::ALL[i]);
-            let lamp = match self {
-                Self::Directional { direction } => Lamp::Directional { direction },
+            let projector = match self {
+                Self::Directional { direction } => Projector::Directional { direction },
                 Self::Spot(SpotLight { position, direction, half_angle_rad, near, range }) => {
-                    Lamp::Pyramid { position, direction, slope: half_angle_rad.tan(), near, range }
+                    Projector::Pyramid {
+                        position,
+                        direction,
+                        slope: half_angle_rad.tan(),
+                        near,
+                        range,
+                    }
                 }
                 Self::Point(PointLight { position, near, range }) => {
                     let direction = side.map_or(DVec3::Y, CubeSide::direction);
-                    Lamp::Pyramid { position, direction, slope: 1.0, near, range }
+                    Projector::Pyramid { position, direction, slope: 1.0, near, range }
                 }
             };
-            (side, lamp)
+            (side, projector)
         })
     }
 
@@ -136,7 +142,7 @@ impl CubeSide {
 
 /// Light that one projection covers: a parallel beam or a pyramid, with a unit direction.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Lamp {
+pub(crate) enum Projector {
     Directional {
         direction: DVec3,
     },
@@ -157,7 +163,7 @@ fn near_end(near: f64, apex: DVec3, size: f64) -> f64 {
     near.max(1e-11 * apex.length().max(size))
 }
 
-impl Lamp {
+impl Projector {
     /// Direction in which the light travels, and for a pyramid the position of its apex relative to
     /// `origin` (world space).
     pub(crate) fn direction_and_apex(&self, origin: DVec3) -> (DVec3, Option<DVec3>) {

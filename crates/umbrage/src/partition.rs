@@ -2,7 +2,7 @@
 
 use crate::bounds::Plane;
 use crate::camera::Camera;
-use crate::light::Lamp;
+use crate::light::Projector;
 use crate::plan::Face;
 use crate::technique::{Partition, Splits};
 use glam::{DVec3, DVec4};
@@ -19,7 +19,7 @@ pub(crate) type Ends = [f64; Partition::MAX_SLICES + 1];
 /// that line and the face's side edges. Wedges extend to infinity, so that rounding at the
 /// frustum's outline excludes no receiver.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Faces {
+pub(crate) struct LitFaces {
     /// Vectors from the eye through the frustum's corners, of depth 1: lower left, lower right,
     /// upper right, upper left. Face i lies between corners i and i + 1.
     rays: [DVec3; 4],
@@ -33,9 +33,9 @@ pub(crate) struct Faces {
 /// nothing.
 const EDGE_ON: f64 = 1e-12;
 
-impl Faces {
-    pub(crate) fn new(camera: &Camera, lamp: &Lamp, with_near: bool) -> Self {
-        let light = homogeneous(lamp, camera);
+impl LitFaces {
+    pub(crate) fn new(camera: &Camera, projector: &Projector, with_near: bool) -> Self {
+        let light = homogeneous(projector, camera);
         let rays = camera.corners_at(1.0);
         let towards = light.truncate();
         let along_view = camera.forward().dot(towards);
@@ -95,8 +95,8 @@ impl Faces {
 }
 
 /// The light as a homogeneous local point.
-fn homogeneous(lamp: &Lamp, camera: &Camera) -> DVec4 {
-    match lamp.direction_and_apex(camera.eye()) {
+fn homogeneous(projector: &Projector, camera: &Camera) -> DVec4 {
+    match projector.direction_and_apex(camera.eye()) {
         (direction, None) => -direction.extend(0.0),
         (_, Some(apex)) => apex.extend(1.0),
     }

@@ -2,7 +2,7 @@ use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::error::Error;
 use crate::focus::Body;
-use crate::light::{Lamp, Light};
+use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
 use crate::resolution::resolutions;
@@ -10,7 +10,7 @@ use crate::technique::{Faces, Limits, Technique};
 use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
 use draft::{Draft, Drafting};
-use finish::{Finish, Finishing};
+use finish::{FinishRequest, Finishing};
 use slices::Slicing;
 
 mod draft;
@@ -91,7 +91,7 @@ struct Bodies {
 /// Checked input for the maps of one projector.
 struct Request<'a> {
     camera: &'a Camera,
-    lamp: &'a Lamp,
+    projector: &'a Projector,
     bounds: &'a Bounds<'a>,
     technique: &'a Technique,
 }
@@ -139,9 +139,12 @@ impl Planner {
             let light = light.checked()?;
             check_light_size(technique, &light)?;
             let first = self.units.len();
-            for (side, lamp) in light.lamps() {
+            for (side, projector) in light.projectors() {
                 let part = Part { light: index, side, ..Part::default() };
-                self.draft_lamp(part, &Request { camera, lamp: &lamp, bounds, technique });
+                self.draft_projector(
+                    part,
+                    &Request { camera, projector: &projector, bounds, technique },
+                );
             }
             let theta_rad = self.theta(&light, camera);
             self.plan.lights.push(PlannedLight { maps: first..self.units.len(), theta_rad });
@@ -149,15 +152,16 @@ impl Planner {
         let Self { limits, plan, drafts, units, sizes, finishing, .. } = self;
         plan.maps.truncate(units.len());
         resolutions(technique, *limits, units, sizes)?;
-        let finish = Finish { camera, bounds, technique, limits: *limits };
+        let request = FinishRequest { camera, bounds, technique, limits: *limits };
         for ((map, draft), &size) in plan.maps.iter_mut().zip(drafts).zip(&*sizes) {
-            finishing.finish(map, draft, size, &finish)?;
+            finishing.finish(map, draft, size, &request)?;
         }
         Ok(plan)
     }
 
     /// Finds the body of the receivers that the camera sees.
     fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
+        // `lit` is not in use yet, and holds the whole view while `view` is put together from boxes.
         let Bodies { view, lit: whole, part, .. } = &mut self.bodies;
         let local = |aabb: Aabb| aabb.relative_to(camera.eye());
         view.set_frustum(camera);
@@ -187,14 +191,14 @@ impl Planner {
     }
 
     /// Appends the maps of one projector, without their resolutions and what depends on these.
-    fn draft_lamp(&mut self, part: Part, request: &Request<'_>) {
-        let Request { camera, lamp, technique, .. } = *request;
+    fn draft_projector(&mut self, part: Part, request: &Request<'_>) {
+        let Request { camera, projector, technique, .. } = *request;
         let Bodies { view, lit, .. } = &mut self.bodies;
-        let pyramid = lamp.frustum(camera.eye(), view.size());
+        let pyramid = projector.frustum(camera.eye(), view.size());
         lit.copy_from(view);
         pyramid.into_iter().flatten().for_each(|plane| lit.clip(plane));
         let with_near = technique.partition.faces == Faces::SidesAndNear;
-        let faces = partition::Faces::new(camera, lamp, with_near);
+        let faces = partition::LitFaces::new(camera, projector, with_near);
         for &face in technique.partition.face_list() {
             self.cell.clear();
             let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));

@@ -1,7 +1,7 @@
 //! Stable maps, whose texels keep their positions in the world.
 
 use crate::camera::Camera;
-use crate::light::Lamp;
+use crate::light::Projector;
 use crate::matrices::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::plan::ShadowMap;
 use crate::slab::along_axis;
@@ -13,12 +13,12 @@ use glam::{DMat3, DVec3, DVec4};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stable {
     space: LightSpace,
-    covers: Covers,
+    region: Region,
     unit_error: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Covers {
+enum Region {
     /// A sphere, covered by a grid of texels that is fixed in the world. The centre is in world
     /// space, metres.
     Sphere { center: DVec3, radius: f64 },
@@ -29,17 +29,17 @@ enum Covers {
 impl Stable {
     /// Covers the bounding sphere of the part of the view frustum from `near` to `far`, or, in a
     /// pyramid of light, all that the light reaches.
-    pub(crate) fn around(lamp: &Lamp, camera: &Camera, [near, far]: [f64; 2]) -> Self {
-        let space = LightSpace::fixed(lamp, camera);
+    pub(crate) fn around(projector: &Projector, camera: &Camera, [near, far]: [f64; 2]) -> Self {
+        let space = LightSpace::fixed(projector, camera);
         let pixel = camera.pixel_width_per_depth();
-        if let Lamp::Pyramid { slope, near, range, .. } = *lamp {
-            let covers = Covers::Pyramid { slope, inverse_depths: [range, near].map(f64::recip) };
+        if let Projector::Pyramid { slope, near, range, .. } = *projector {
+            let region = Region::Pyramid { slope, inverse_depths: [range, near].map(f64::recip) };
             // The error of a receiver that the camera sees from the same distance as the lamp.
-            return Self { space, covers, unit_error: 2.0 * slope / pixel };
+            return Self { space, region, unit_error: 2.0 * slope / pixel };
         }
         let (center, radius) = bounding_sphere(camera, [near, far]);
-        let covers = Covers::Sphere { center: camera.eye() + center, radius };
-        Self { space, covers, unit_error: 2.0 * radius / (near * pixel) }
+        let region = Region::Sphere { center: camera.eye() + center, radius };
+        Self { space, region, unit_error: 2.0 * radius / (near * pixel) }
     }
 
     /// The map's largest errors in s and t with one texel, pixels per texel, whatever receivers
@@ -51,12 +51,12 @@ impl Stable {
     /// Sets a map's matrices for the resolution that it has. Returns the distance by which the map
     /// has to begin before depth 0, as a share of its range of depths.
     pub(crate) fn place(&self, map: &mut ShadowMap) -> f64 {
-        let (middle, width, depth) = match self.covers {
-            Covers::Pyramid { slope, inverse_depths: [far, near] } => {
+        let (middle, width, depth) = match self.region {
+            Region::Pyramid { slope, inverse_depths: [far, near] } => {
                 let depth = DepthRange::around(far.midpoint(near), (near - far) / 2.0);
                 ([0.0; 2], [2.0 * slope; 2], depth)
             }
-            Covers::Sphere { center, radius } => {
+            Region::Sphere { center, radius } => {
                 // The map is one texel wider than the sphere, and so can move by up to half a texel
                 // each way.
                 let texel = map.resolution.map(|n| 2.0 * radius / f64::from(n - 1));
@@ -81,10 +81,10 @@ impl Stable {
         [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &self.space);
         map.apex = self.space.apex;
         map.slab = along_axis(&self.space);
-        match self.covers {
+        match self.region {
             // The sphere's range of depths already includes the margin.
-            Covers::Sphere { .. } => 0.0,
-            Covers::Pyramid { slope, inverse_depths: [far, near] } => {
+            Region::Sphere { .. } => 0.0,
+            Region::Pyramid { slope, inverse_depths: [far, near] } => {
                 // At the near end a texel's width is 2 slope/res times the distance from the lamp,
                 // and 1/distance changes by the same share along that width.
                 let shortest = map.resolution[0].min(map.resolution[1]);

@@ -45,13 +45,13 @@ impl Drafting {
         is_trial: bool,
         request: &Request<'_>,
     ) -> [f64; 2] {
-        let Request { camera, lamp, technique, .. } = *request;
+        let Request { camera, projector, technique, .. } = *request;
         let Some(middle) = body.middle() else { return [0.0; 2] };
         let covers_scene = technique.cover == Cover::Scene;
         let space = &match along {
-            _ if covers_scene => LightSpace::fixed(lamp, camera),
-            Along::View => LightSpace::following_view(lamp, camera, middle),
-            Along::Side(side) => LightSpace::following_face(lamp, camera, side, middle),
+            _ if covers_scene => LightSpace::fixed(projector, camera),
+            Along::View => LightSpace::following_view(projector, camera, middle),
+            Along::Side(side) => LightSpace::following_face(projector, camera, side, middle),
         };
         let Self { seen, covered, worst, .. } = self;
         let see = |p: DVec3| Seen::new(p, space, camera);
@@ -125,7 +125,7 @@ impl Request<'_> {
     fn whole_scene(&self, space: &LightSpace) -> [DVec3; 8] {
         let eye = self.camera.eye();
         let scene = self.bounds.receivers.map(|r| self.bounds.casters.map_or(r, |c| r.union(c)));
-        match (self.lamp.corners(eye), scene) {
+        match (self.projector.corners(eye), scene) {
             (Some(corners), _) => corners,
             (_, Some(scene)) => scene.relative_to(eye).corners(),
             (_, None) => bounding_cube(self.camera, space),

@@ -27,7 +27,7 @@ const CLOSEST_TO_LAMP: f64 = 16.0;
 
 /// Checked input.
 #[derive(Clone, Copy)]
-pub(super) struct Finish<'a> {
+pub(super) struct FinishRequest<'a> {
     pub(super) camera: &'a Camera,
     pub(super) bounds: &'a Bounds<'a>,
     pub(super) technique: &'a Technique,
@@ -97,9 +97,9 @@ impl Finishing {
         map: &mut ShadowMap,
         draft: &Draft,
         size: [u32; 2],
-        request: &Finish<'_>,
+        request: &FinishRequest<'_>,
     ) -> Result<(), Error> {
-        let Finish { camera, bounds, technique, limits } = *request;
+        let FinishRequest { camera, bounds, technique, limits } = *request;
         if draft.body.is_empty() {
             map.resolution = [0, 0];
             return Ok(());

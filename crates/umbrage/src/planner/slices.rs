@@ -110,7 +110,7 @@ impl Planner {
         map.cell.push(Plane { normal: -camera.forward(), offset: camera.far() });
         draft.stable = (technique.cover == Cover::Stable).then(|| {
             let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
-            Stable::around(request.lamp, camera, range)
+            Stable::around(request.projector, camera, range)
         });
         let unit = match &draft.stable {
             None => self.drafting.draft(map, &draft.body, along, *warp, false, request),
@@ -120,7 +120,7 @@ impl Planner {
         };
         self.units.push(unit);
         let around = self.around.iter().chain(&map.cell).copied();
-        let space = LightSpace::fixed(request.lamp, camera);
+        let space = LightSpace::fixed(request.projector, camera);
         let outline = &mut self.slicing.outline;
         caster_planes(&mut map.caster_planes, around, &draft.body, &space, outline);
     }

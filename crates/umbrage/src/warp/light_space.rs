@@ -1,5 +1,5 @@
 use crate::camera::Camera;
-use crate::light::{Lamp, Light};
+use crate::light::{Light, Projector};
 use crate::math::perpendicular_pair;
 use crate::partition::Side;
 use glam::{DMat4, DVec2, DVec3, DVec4};
@@ -27,24 +27,29 @@ pub(crate) struct LightSpace {
 impl LightSpace {
     /// Light space of a whole view, with z along the view direction. `middle` is a local point amid
     /// the receivers seen.
-    pub(crate) fn following_view(lamp: &Lamp, camera: &Camera, middle: DVec3) -> Self {
-        let (direction, apex) = lamp.direction_and_apex(camera.eye());
+    pub(crate) fn following_view(projector: &Projector, camera: &Camera, middle: DVec3) -> Self {
+        let (direction, apex) = projector.direction_and_apex(camera.eye());
         let beam = apex.map_or(direction, |apex| (middle - apex).normalize());
         let sin_theta = beam.cross(camera.forward()).length();
-        Self { sin_theta, ..Self::following(lamp, camera, [camera.forward(); 2], middle) }
+        Self { sin_theta, ..Self::following(projector, camera, [camera.forward(); 2], middle) }
     }
 
     /// Light space of a side face of the view frustum, with z along the bisector of the face's side
     /// edges (Lloyd et al. 2006, §5.1). Whatever the light's direction, the width of a pixel on
     /// the face grows along z as it grows along the view under overhead light.
-    pub(crate) fn following_face(lamp: &Lamp, camera: &Camera, side: &Side, middle: DVec3) -> Self {
-        Self::following(lamp, camera, side.edges(), middle)
+    pub(crate) fn following_face(
+        projector: &Projector,
+        camera: &Camera,
+        side: &Side,
+        middle: DVec3,
+    ) -> Self {
+        Self::following(projector, camera, side.edges(), middle)
     }
 
     /// Light space with z along the bisector of two vectors from the eye, of depth 1, as seen from
     /// the light.
-    fn following(lamp: &Lamp, camera: &Camera, ways: [DVec3; 2], middle: DVec3) -> Self {
-        let (direction, apex) = lamp.direction_and_apex(camera.eye());
+    fn following(projector: &Projector, camera: &Camera, ways: [DVec3; 2], middle: DVec3) -> Self {
+        let (direction, apex) = projector.direction_and_apex(camera.eye());
         let beam = apex.map_or(direction, |apex| (middle - apex).normalize());
         let slopes = ways.map(|way| {
             let slope = apex.map_or(way, |apex| {
@@ -71,8 +76,8 @@ impl LightSpace {
     }
 
     /// Light space whose orientation depends on the light alone.
-    pub(crate) fn fixed(lamp: &Lamp, camera: &Camera) -> Self {
-        let (direction, apex) = lamp.direction_and_apex(camera.eye());
+    pub(crate) fn fixed(projector: &Projector, camera: &Camera) -> Self {
+        let (direction, apex) = projector.direction_and_apex(camera.eye());
         let [_, z] = perpendicular_pair(direction);
         Self::new(direction, apex, z, 0.0, 0.0)
     }
