@@ -41,7 +41,7 @@ pub struct ScaleOffset {
     pub offset: DVec2,
 }
 
-/// The error of maps that do not fit into one texture.
+/// The error of maps for which one texture has no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "no room for {maps} shadow maps of {texels} texels, gutters included, in a texture of {max_side}x{max_side}"
@@ -209,7 +209,7 @@ impl Rectangles {
         Ok(Self { list, max_side, too_large })
     }
 
-    /// The smallest size that each rectangle fits into.
+    /// The smallest size that can hold any one of the rectangles.
     fn largest(&self) -> [u32; 2] {
         self.list.iter().fold([0, 0], |[w, h], &(_, size)| [w.max(size[0]), h.max(size[1])])
     }
@@ -259,7 +259,7 @@ impl Rectangles {
         best
     }
 
-    /// Packs the rectangles into a texture of this size in this order; `None` if they do not fit.
+    /// Packs the rectangles into a texture of this size in this order; `None` if there is no room.
     fn pack_into(&self, size: [u32; 2], order: &[usize]) -> Option<Packing> {
         let int = |n: u32| i32::try_from(n).unwrap_or(i32::MAX);
         let mut allocator =
@@ -289,9 +289,9 @@ const FINENESS: u32 = 64;
 const ORDERS: [fn([u32; 2]) -> [u32; 2]; 3] =
     [|[w, h]| [h, w], |[w, h]| [w, h], |[w, h]| [w.max(h), w.min(h)]];
 
-/// One list of free rectangles, of which the closest fit is taken. The crate's default thresholds
-/// place large rectangles where most room is left, which keeps a long-lived atlas from fragmenting,
-/// but in an atlas that is filled once they waste three times as much.
+/// One list of free rectangles, of which the smallest that suffices is taken. The crate's default
+/// thresholds place large rectangles where most room is left, which keeps a long-lived atlas from
+/// fragmenting, but in an atlas that is filled once they waste three times as much.
 const BEST_FIT: AllocatorOptions = AllocatorOptions {
     small_size_threshold: i32::MAX,
     large_size_threshold: i32::MAX,

@@ -314,8 +314,8 @@ fn depth_range(
     shadow_distance: Option<f64>,
 ) -> Result<[f64; 2], Error> {
     let (sign, scale) = (w.z.signum(), w.z.abs());
-    // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d). Solved for d, it gives both ends of
-    // the depth range.
+    // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d). Solved for d, it gives both ends
+    // of the depth range.
     let distance_of = |ndc: f64| z.w / (ndc * scale - z.z * sign);
     let low = match clip_depth {
         ClipDepth::ZeroToOne => 0.0,

@@ -161,7 +161,7 @@ impl Planner {
 
     /// Finds the body of the receivers that the camera sees.
     fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
-        // `lit` is not in use yet, and holds the whole view while `view` is put together from boxes.
+        // `lit` is not in use yet; it holds the whole view while `view` is put together from boxes.
         let Bodies { view, lit: whole, part, .. } = &mut self.bodies;
         let local = |aabb: Aabb| aabb.relative_to(camera.eye());
         view.set_frustum(camera);

@@ -6,8 +6,7 @@
 //! plane is known exactly at a texel's centre ([`Receiver::slope`]; this is receiver plane depth
 //! bias). A texel hides the receiver if its depth is less than
 //!
-//! > min(depth of the receiver's plane at the texel's centre, the receiver's own depth) − h −
-//! > 2⁻²⁵
+//! > min(depth of that plane at the texel's centre, the receiver's own depth) − h − 2⁻²⁵
 //!
 //! - The plane's depth alone is exact for plane surfaces. Where the surface bends away from the
 //!   light within a texel, however, texels deeper than the receiver would hide it; the minimum
