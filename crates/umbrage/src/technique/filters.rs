@@ -106,15 +106,15 @@ pub(super) const WORDS: &[Word] = &[
         value: "",
         example: "evsm",
         options: &[BLUR, LEAK, EXPONENT, HALF],
-        meaning: "Exponential variance shadow maps with four numbers to a texel (Lauritzen and McCool \
-                  2008).",
+        meaning: "Exponential variance shadow maps: moments of two exponentials of depth, blurred ahead of \
+                  lookup (Lauritzen and McCool 2008).",
     },
     Word {
         name: "evsm2",
         value: "",
         example: "evsm2",
         options: &[BLUR, LEAK, EXPONENT, HALF],
-        meaning: "Exponential variance shadow maps with two numbers to a texel.",
+        meaning: "Exponential variance shadow maps with one exponential: half the memory, more light leaks.",
     },
     Word {
         name: "msm",
@@ -164,7 +164,7 @@ pub(super) const WORDS: &[Word] = &[
                 name: "bits",
                 value: "16",
                 example: "bits=16",
-                meaning: "Stores 16 bits a number in place of 8.",
+                meaning: "Stores each statistic in 16 bits in place of 8.",
             },
             HALF,
         ],

@@ -23,8 +23,8 @@ pub(super) const WARPS: &[Word] = &[
             name: "stable",
             value: "",
             example: "stable",
-            meaning: "Covers all that the camera may turn to, so that texels stand still in the world \
-                      and shadows do not shimmer.",
+            meaning: "Covers all that the camera may turn to, so that texels keep their places in the \
+                      world and shadows do not shimmer.",
         }],
         meaning: "An even map, focused on the receivers that the camera sees.",
     },
