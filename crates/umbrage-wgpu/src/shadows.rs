@@ -7,7 +7,7 @@ use crate::{Error, Support, data};
 use glam::{DMat4, DVec3};
 use std::mem::size_of;
 use std::num::NonZeroU64;
-use umbrage::visibility::Filter;
+use umbrage::visibility::{Filter, Prefilter};
 use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
@@ -189,7 +189,10 @@ impl Shadows {
             .filter
             .check()
             .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
-        let is_spread = matches!(options.filter, Filter::Spread { .. } | Filter::Pcss { .. });
+        let is_spread = match options.filter {
+            Filter::Spread { .. } | Filter::Pcss { .. } => true,
+            Filter::Hard | Filter::Pcf { .. } | Filter::Prefiltered(_) => false,
+        };
         if is_spread && !support.depth_fetch {
             return Err(Error::Unsupported {
                 what: "fetching of depths",
@@ -203,11 +206,12 @@ impl Shadows {
             comparison => comparison,
         };
         let options = ShadowOptions { comparison, ..*options };
-        let filter_mode = match (comparison, options.filter) {
-            (Comparison::Hardware, Filter::Pcf { .. }) | (_, Filter::Prefiltered(_)) => {
-                FilterMode::Linear
+        let filter_mode = match options.filter {
+            Filter::Prefiltered(_) => FilterMode::Linear,
+            Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
+            Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => {
+                FilterMode::Nearest
             }
-            _ => FilterMode::Nearest,
         };
         let sampler = device.create_sampler(&SamplerDescriptor {
             label: Some("shadow sampler"),
@@ -220,9 +224,9 @@ impl Shadows {
         let lookup_layout = lookup_layout(device, &support, &options);
         let buffers = Buffers::new(device, &support);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
-        let prefiltering = match &options.filter {
-            Filter::Prefiltered(p) => Some(Prefiltering::new(device, &support, p, &texture)?),
-            _ => None,
+        let prefiltering = match prefilter(&options.filter) {
+            Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
+            None => None,
         };
         let view = looked_up(&texture, prefiltering.as_ref());
         let lookup_bind_group = buffers.bind(device, &lookup_layout, view, &sampler);
@@ -610,9 +614,17 @@ impl CasterBuffer {
     }
 }
 
+/// The filter that is applied ahead of lookup, if it is one.
+fn prefilter(filter: &Filter) -> Option<&Prefilter> {
+    match filter {
+        Filter::Prefiltered(prefilter) => Some(prefilter),
+        Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => None,
+    }
+}
+
 /// Whether the texture unit compares depths.
 fn compares(options: &ShadowOptions) -> bool {
-    options.comparison == Comparison::Hardware && !matches!(options.filter, Filter::Prefiltered(_))
+    options.comparison == Comparison::Hardware && prefilter(&options.filter).is_none()
 }
 
 /// What lookup samples.
@@ -658,22 +670,22 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         buffer(array),
         buffer(array),
         buffer(array),
-        match options.filter {
-            Filter::Prefiltered(_) => BindingType::Texture {
+        match prefilter(&options.filter) {
+            Some(_) => BindingType::Texture {
                 sample_type: TextureSampleType::Float { filterable: true },
                 view_dimension: TextureViewDimension::D2Array,
                 multisampled: false,
             },
-            _ => BindingType::Texture {
+            None => BindingType::Texture {
                 sample_type: TextureSampleType::Depth,
                 view_dimension: view_dimension(options.layout),
                 multisampled: false,
             },
         },
-        BindingType::Sampler(match options.filter {
-            Filter::Prefiltered(_) => SamplerBindingType::Filtering,
-            _ if compares(options) => SamplerBindingType::Comparison,
-            _ => SamplerBindingType::NonFiltering,
+        BindingType::Sampler(match prefilter(&options.filter) {
+            Some(_) => SamplerBindingType::Filtering,
+            None if compares(options) => SamplerBindingType::Comparison,
+            None => SamplerBindingType::NonFiltering,
         }),
     ];
     let entries = (0..).zip(types);

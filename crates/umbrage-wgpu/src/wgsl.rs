@@ -65,7 +65,9 @@ fn filtered(filter: Filter, comparison: Comparison) -> String {
             let n = n.clamp(1, Filter::MAX_PCF).to_string();
             include_str!("wgsl/pcf_weight.wgsl").replace("{N}", &n) + pcf
         }
-        _ => hard.to_owned(),
+        Filter::Hard => hard.to_owned(),
+        // Looked up by other functions.
+        Filter::Prefiltered(_) => String::new(),
     }
 }
 
@@ -188,8 +190,6 @@ fn statistic(statistic: &Statistic) -> String {
                 .replace("{GAIN}", &number(s.gain()))
                 .replace("{LEAK}", &number(s.leak()))
         }
-        // The core's list is open to it alone.
-        _ => String::new(),
     };
     let textures = textures(statistic).to_string();
     [include_str!("wgsl/slab.wgsl"), chebyshev, &own.replace("{TEXTURES}", &textures), ""]

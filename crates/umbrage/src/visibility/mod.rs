@@ -58,7 +58,6 @@ const ROUNDING: f64 = 1e-6;
 
 /// How the texels around a point are looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
 pub enum Filter {
     /// The nearest texel.
     #[default]

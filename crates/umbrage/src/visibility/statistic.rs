@@ -38,7 +38,6 @@ pub type Channels = [f32; MAX_CHANNELS];
 
 /// Which numbers are stored in place of depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Statistic {
     /// Variance shadow maps.
     Vsm(Vsm),
