@@ -88,8 +88,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut planner = Planner::new();
     let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &options)?;
 
-    // 3. The shadows themselves, once: what filters them. And a pipeline that draws casters; for one of your own,
-    //    `Shadows::caster_wgsl`, `depth_stencil_state` and `primitive_state` have what it needs.
+    // 3. The shadows themselves, once: what filters them. And a pipeline that draws casters; for one
+    //    of your own, `Shadows::caster_wgsl`, `caster_fragment`, `depth_stencil_state` and
+    //    `primitive_state` have what it needs.
     let shadow_options = ShadowOptions { filter: Filter::pcf(3)?, ..Default::default() };
     let mut shadows = Shadows::new(&device, Support::new(&adapter, &device)?, &shadow_options)?;
     let positions = wgpu::VertexBufferLayout {

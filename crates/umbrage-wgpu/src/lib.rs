@@ -7,9 +7,10 @@
 //!   the passes that [`Prepared::encode`] asks for, and bind [`Shadows::lookup_bind_group`] where you shade.
 //! - [`Shadows::lookup_wgsl`] is the text to put before your shader: it has
 //!   `shadow_visibility(light, position, normal) -> f32`.
-//! - [`MeshCasters`] draws plain meshes into the maps, alpha-masked ones too. Or draw with pipelines of your own: a
-//!   [`MapPass`] gives matrix, viewport and culling, [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`]
-//!   the states, [`Shadows::caster_wgsl`] the vertex shader's part.
+//! - [`MeshCasters`] draws plain meshes into the maps, alpha-masked ones too. Or draw with pipelines
+//!   of your own: a [`MapPass`] gives matrix, viewport and culling, [`Shadows::depth_stencil_state`]
+//!   and [`Shadows::primitive_state`] the states, [`Shadows::caster_wgsl`] the shader's part and
+//!   [`Shadows::caster_fragment`] the fragment stage.
 //! - [`Support`] says what a device can do, and documents what takes the place of what it cannot.
 //!
 //! # Spaces

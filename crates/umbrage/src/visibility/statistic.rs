@@ -12,8 +12,8 @@
 //! | [`Msm`] | four moments | Hamburger's bound |
 //! | [`Csm`] | sines and cosines of depth | the step's Fourier series |
 //!
-//! To add one: a file beside this one, a file of the same name in `umbrage-wgpu/src/wgsl`, and a line in each place that has
-//! [`Statistic`]'s variants in a `match`, which the compiler names.
+//! To add one: a file beside this one, a file of the same name in `umbrage-wgpu/src/wgsl/statistic`,
+//! and a line in each place that has [`Statistic`]'s variants in a `match`, which the compiler names.
 
 mod csm;
 mod esm;
