@@ -9,8 +9,9 @@
 //!   `shadow_visibility(light, position, normal) -> f32`.
 //! - [`MeshCasters`] draws plain meshes into the maps, alpha-masked ones too. Or draw casters with
 //!   pipelines of your own: a [`MapPass`] gives the matrix, the viewport and the culling,
-//!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states, and
-//!   [`Shadows::caster_wgsl`] gives the vertex shader's part.
+//!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states,
+//!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the fragment
+//!   stage that the device needs.
 //! - [`Support`] says what a device can do, and documents what takes the place of what it cannot
 //!   do.
 //!

@@ -14,7 +14,7 @@
 //! | [`Csm`] | sines and cosines of depth | the Fourier series of the step function |
 //!
 //! A new statistic needs a file beside this one, a file of the same name in
-//! `umbrage-wgpu/src/wgsl`, and a line in each `match` over the variants of [`Statistic`], which
+//! `umbrage-wgpu/src/wgsl/statistic`, and a line in each `match` over the variants of [`Statistic`], which
 //! the compiler reports.
 
 mod csm;
