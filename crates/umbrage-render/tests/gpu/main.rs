@@ -1,35 +1,29 @@
-//! On a real device, lavapipe where there is no other. Without any these tests fail: `tools/setup` installs one.
+//! On a real device, lavapipe where there is no other.
 
 mod parity;
 mod pictures;
 mod trouble;
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::LazyLock;
 use umbrage::{Aabb, Bounds, Camera, Light, Options, Plan, Planner};
 use umbrage_render::Gpu;
 use umbrage_scene::Scene;
+use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 
 /// One device for all.
 pub(crate) static GPU: LazyLock<Gpu> =
     LazyLock::new(|| Gpu::open().expect("a GPU, or a driver in software: run tools/setup"));
 
-/// A scene by name: a file of the shared scenes, or built in.
+/// A scene by name: a file of the third-party scenes, or built in.
 pub(crate) fn scene(name: &str) -> Scene {
     if !name.ends_with(".glb") {
         let (name, size) = name.split_once(':').unwrap_or((name, ""));
         return umbrage_scene::builtin(name, size.parse().ok()).unwrap();
     }
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/scenes");
-    let folder = std::env::var_os("UMBRAGE_SCENES").map_or(PathBuf::from(default), PathBuf::from);
-    let path = folder.join(name);
-    assert!(
-        path.is_file(),
-        "{} is missing: these tests need the shared scenes; set UMBRAGE_SCENES to their folder",
-        path.display()
-    );
-    umbrage_scene::load(&path).unwrap()
+    let path = Path::new(third_party_scenes!()).join(name);
+    umbrage_scene::load(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A scene with its own view, ready for rays.

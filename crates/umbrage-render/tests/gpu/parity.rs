@@ -1,13 +1,14 @@
 //! The GPU's pictures against the reference's, which casts a ray through every texel.
 
 use crate::{GPU, Set, scene};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{
     Camera, Faces, Light, Objective, Options, Partition, Plan, Size, Splits, SpotLight, Warp,
 };
 use umbrage_render::{Look, Renderer, Sample, SceneBuffers};
+use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
 
@@ -164,64 +165,97 @@ fn some(indices: &[usize]) -> Vec<(&'static str, Options)> {
     indices.iter().map(|&i| all[i]).collect()
 }
 
+#[needs(gpu)]
 #[test]
 fn in_a_town() {
     agrees("town:40", &techniques());
 }
 
+#[needs(gpu)]
 #[test]
 fn on_an_airfield() {
     agrees("airfield", &some(&[1, 3, 5, 7]));
 }
 
+#[needs(gpu)]
 #[test]
 fn among_statues() {
     agrees("statues", &some(&[0, 4, 8]));
 }
 
+#[needs(gpu)]
 #[test]
 fn in_a_grove() {
     agrees("grove", &some(&[2, 6, 9]));
 }
 
+#[needs(gpu)]
 #[test]
 fn at_a_fence() {
     agrees("fence", &some(&[1, 4, 7]));
 }
 
 /// A point light: six maps, or more.
+#[needs(gpu)]
 #[test]
 fn around_a_lantern() {
     agrees("lantern", &some(&[1, 4, 7, 9]));
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn on_a_race_track() {
     agrees("vehicles/kenney_racing_level.glb", &some(&[2, 3, 5, 8]));
 }
 
 /// Alpha masks.
+#[needs(gpu, scenes)]
 #[test]
 fn in_a_forest() {
     agrees("trees/forest_eztree.glb", &some(&[0, 6, 7]));
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn in_an_atrium() {
     agrees("atrium/sponza_atrium_reduced.glb", &some(&[1, 5, 9]));
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn over_kilometres_of_terrain() {
     agrees("terrain/jacksboro_dem_terrain.glb", &some(&[3, 4, 8]));
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn in_a_house_of_centimetres() {
     agrees("house/house.glb", &some(&[2, 4, 6]));
 }
 
+/// A world of centimetres and one of kilometres.
+#[needs(gpu)]
+#[test]
+fn at_any_scale() {
+    for scale in [0.01, 1000.0] {
+        let mut scene = scene("statues");
+        for instance in &mut scene.instances {
+            let scaled = DAffine3::from_scale(DVec3::splat(scale));
+            instance.world_from_mesh = scaled * instance.world_from_mesh;
+        }
+        for camera in &mut scene.cameras {
+            [camera.eye, camera.target] = [camera.eye, camera.target].map(|p| p * scale);
+            [camera.near, camera.far] = [camera.near, camera.far].map(|d| d * scale);
+        }
+        let set = Set::new(&scene, IMAGE);
+        for (technique, options) in some(&[2, 4, 8]) {
+            agrees_with(&format!("statues x {scale}"), &set, technique, &options, Filter::Hard);
+        }
+    }
+}
+
 /// Whatever a device lacks, the picture is the same, but for what comparisons by the texture unit cost.
+#[needs(gpu)]
 #[test]
 fn every_fallback_draws_the_same_picture() {
     let scene = scene("town:20");
@@ -258,9 +292,20 @@ fn every_fallback_draws_the_same_picture() {
     }
 }
 
-/// What is filtered ahead of lookup, in four scenes, under an even map, a warp and slices.
+#[needs(gpu)]
 #[test]
-fn every_prefilter_in_four_scenes() {
+fn every_prefilter_in_three_scenes() {
+    every_prefilter(&["town:20", "fence", "lantern"]);
+}
+
+#[needs(gpu, scenes)]
+#[test]
+fn every_prefilter_in_a_forest() {
+    every_prefilter(&["trees/forest_eztree.glb"]);
+}
+
+/// What is filtered ahead of lookup, under an even map, a warp and slices.
+fn every_prefilter(scenes: &[&str]) {
     let csm = |m| Statistic::Csm(Csm::new(m, 0.0, false, true).unwrap());
     let statistics = [
         Statistic::Vsm(Vsm::default()),
@@ -271,7 +316,7 @@ fn every_prefilter_in_four_scenes() {
         csm(4),
         csm(16),
     ];
-    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+    for name in scenes {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         for (i, statistic) in statistics.into_iter().enumerate() {
@@ -283,15 +328,26 @@ fn every_prefilter_in_four_scenes() {
     }
 }
 
-/// Widths in pixels and metres: smaller copies of maps, and several samples along a footprint.
+#[needs(gpu)]
 #[test]
-fn every_width_in_four_scenes() {
+fn every_width_in_three_scenes() {
+    every_width(&["town:20", "fence", "lantern"]);
+}
+
+#[needs(gpu, scenes)]
+#[test]
+fn every_width_in_a_forest() {
+    every_width(&["trees/forest_eztree.glb"]);
+}
+
+/// Widths in pixels and metres: smaller copies of maps, and several samples along a footprint.
+fn every_width(scenes: &[&str]) {
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
     let prefilter = |statistic, width| {
         let half = width == Width::Metres(0.6);
         Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width), half })
     };
-    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+    for name in scenes {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         let filters = [
@@ -313,6 +369,7 @@ fn every_width_in_four_scenes() {
 }
 
 /// A sun, a spot light and a point light in one plan, each looked up for itself.
+#[needs(gpu)]
 #[test]
 fn several_lights_share_a_plan() {
     let scene = scene("lantern");
@@ -345,6 +402,7 @@ fn several_lights_share_a_plan() {
 }
 
 /// The world's origin is far away: the camera's matrices, the maps' and the instances' keep their digits.
+#[needs(gpu)]
 #[test]
 fn a_million_metres_from_the_origin() {
     let mut scene = scene("pole");

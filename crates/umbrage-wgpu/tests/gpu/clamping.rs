@@ -4,6 +4,7 @@ use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::cast_slice;
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::{Options, Partition, Size, Warp};
+use umbrage_testing::needs;
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
     Timestamps,
@@ -91,6 +92,7 @@ fn ground(beam: &umbrage::Beam) -> Option<DVec3> {
     Some(beam.origin + beam.direction * t).filter(|p| p.x.abs() < 10.0)
 }
 
+#[needs(gpu)]
 #[test]
 fn emulated_clamping_gives_the_same_depths() {
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Psm] {
