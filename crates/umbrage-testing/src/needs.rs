@@ -9,18 +9,21 @@ pub(crate) fn missing() -> [String; 3] {
 
 /// The folder of third-party scenes, be it there or not.
 pub(crate) fn scenes() -> PathBuf {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    workspace.join(set("UMBRAGE_SCENES").unwrap_or("../shared/scenes".into()))
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(named_scenes())
+}
+
+/// As named, from the workspace's root.
+fn named_scenes() -> String {
+    set("UMBRAGE_SCENES").unwrap_or("../shared/scenes".into())
 }
 
 fn missing_scenes() -> Option<String> {
-    if scenes().is_dir() {
-        return None;
-    }
-    let folder = set("UMBRAGE_SCENES").unwrap_or("../shared/scenes".into());
-    Some(format!(
-        "needs third-party scenes: UMBRAGE_SCENES, by default ../shared/scenes, is no folder here: {folder}"
-    ))
+    (!scenes().is_dir()).then(|| {
+        let folder = named_scenes();
+        format!(
+            "needs third-party scenes: there is no folder {folder} (UMBRAGE_SCENES names another)"
+        )
+    })
 }
 
 /// Only Linux can be without any driver for a GPU; there the loader finds drivers by these files.

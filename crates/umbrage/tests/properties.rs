@@ -106,6 +106,15 @@ proptest! {
 /// along its edges, found by brute force from all triples and pairs of its planes.
 #[test]
 fn maxima_are_reached() {
+    // Each core takes its share of the warps, over the same cases.
+    std::thread::scope(|scope| {
+        for warps in WARPS.chunks(3) {
+            scope.spawn(|| check_maxima(warps));
+        }
+    });
+}
+
+fn check_maxima(warps: &[(&str, Warp)]) {
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         cases: 10_000,
         failure_persistence: None,
@@ -118,9 +127,9 @@ fn maxima_are_reached() {
             let corners = config.corners();
             prop_assume!(corners.len() >= 4);
             let mut planner = Planner::new();
-            for (name, warp) in WARPS {
+            for (name, warp) in warps {
                 let plan = planner
-                    .plan(&config.camera, &[config.light], &config.bounds, &options(warp))
+                    .plan(&config.camera, &[config.light], &config.bounds, &options(*warp))
                     .unwrap();
                 let map = &plan.maps[0];
                 prop_assert!(!map.is_empty());

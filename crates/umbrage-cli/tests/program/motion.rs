@@ -126,7 +126,7 @@ fn filtered_numbers_do_not_sparkle_where_comparisons_do() {
         "report",
         "--json",
         "--size",
-        "240x135",
+        "120x68",
         "--eye",
         "-178,178,400",
         "--target",
@@ -160,7 +160,7 @@ fn noise_has_a_picture() {
             "--aov",
             "minification",
             "--size",
-            "96x54",
+            "48x27",
             "--shadows",
             technique,
         ]);

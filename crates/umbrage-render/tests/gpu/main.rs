@@ -32,6 +32,7 @@ pub(crate) struct Set<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) camera: Camera,
     boxes: Vec<Aabb>,
+    light: Light,
 }
 
 impl<'a> Set<'a> {
@@ -40,11 +41,13 @@ impl<'a> Set<'a> {
         let v = scene.default_view();
         let look = v.look_at(image);
         let boxes = tracer.boxes(64);
-        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes }
+        // Choosing view and light takes seconds in a large scene that brings none.
+        let light = scene.light_for_view(&v).light;
+        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes, light }
     }
 
     pub(crate) fn light(&self) -> Light {
-        self.scene.default_light().light
+        self.light
     }
 
     pub(crate) fn plan(&self, lights: &[Light], options: &Options) -> Plan {
