@@ -1,9 +1,10 @@
-//! Damaged files: each small real scene is cut short and changed at hundreds of places. Loading
-//! gives a sound scene or an error.
+//! Damaged files: every small third-party scene, cut short and with bytes changed at hundreds of places,
+//! loads or gets an error, and what loads is sound.
 
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
-use umbrage_scene::{Scene, load};
+mod damage;
+
+use std::path::Path;
+use umbrage_testing::{needs, third_party_scenes};
 
 const SMALL: &[&str] = &[
     "characters/CesiumMan.glb",
@@ -19,111 +20,13 @@ const SMALL: &[&str] = &[
     "lattice/barn_skylight.glb",
 ];
 
+#[needs(scenes)]
 #[test]
 fn damaged_files_never_panic() {
-    let folder = match std::env::var_os("UMBRAGE_SCENES") {
-        Some(folder) => folder.into(),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
+    let folder = Path::new(third_party_scenes!());
+    let read = |file: &&'static str| {
+        let path = folder.join(file);
+        (*file, std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
     };
-    let temporary = tempfile::tempdir().unwrap();
-    let (loaded, refused) = (AtomicU32::new(0), AtomicU32::new(0));
-    std::thread::scope(|scope| {
-        for (k, file) in SMALL.iter().enumerate() {
-            let path = folder.join(file);
-            let damaged = temporary.path().join(format!("damaged{k}.glb"));
-            let (loaded, refused) = (&loaded, &refused);
-            scope.spawn(move || {
-                let bytes = std::fs::read(&path)
-                    .unwrap_or_else(|e| panic!("{}: {e}; set UMBRAGE_SCENES", path.display()));
-                let mut damage = Damage(k as u64);
-                for round in 0..300 {
-                    std::fs::write(&damaged, damage.apply(&bytes, round)).unwrap();
-                    let what = format!("{file}, round {round}");
-                    match load(&damaged) {
-                        Ok(scene) => {
-                            // Choosing a view costs a hundred times as much as loading, so only
-                            // some scenes get one.
-                            if loaded.fetch_add(1, Relaxed) % 32 == 0 {
-                                assert_view(&scene, &what);
-                            }
-                            assert_sound(&scene, &what);
-                        }
-                        Err(e) => {
-                            assert!(e.to_string().len() < 600, "{what}: {e}");
-                            refused.fetch_add(1, Relaxed);
-                        }
-                    }
-                }
-            });
-        }
-    });
-    // Both outcomes must occur, or the damage would be too small or too large to test anything.
-    let (loaded, refused) = (loaded.into_inner(), refused.into_inner());
-    assert!(loaded > 300 && refused > 300, "{loaded} loaded, {refused} refused");
-}
-
-/// Changes files in a reproducible way.
-struct Damage(u64);
-
-impl Damage {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % n
-    }
-
-    fn apply(&mut self, bytes: &[u8], round: usize) -> Vec<u8> {
-        let json_end = 20 + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-        let mut copy = bytes.to_vec();
-        match round % 6 {
-            0 => copy.truncate(self.below(bytes.len())),
-            // Digits of indices, counts and offsets are replaced by others, and the JSON stays
-            // valid.
-            1..=3 => {
-                for _ in 0..=round % 4 {
-                    let start = 20 + self.below(json_end - 20);
-                    if let Some(i) = (start..json_end).find(|&i| copy[i].is_ascii_digit()) {
-                        copy[i] = b'0' + self.below(10) as u8;
-                    }
-                }
-            }
-            4 => {
-                let i = self.below(json_end);
-                copy[i] ^= 1 << self.below(8);
-            }
-            _ => {
-                for _ in 0..8 {
-                    let i = json_end + self.below(bytes.len() - json_end);
-                    copy[i] = self.below(256) as u8;
-                }
-            }
-        }
-        copy
-    }
-}
-
-fn assert_sound(scene: &Scene, what: &str) {
-    for m in &scene.meshes {
-        let n = m.positions.len();
-        assert!(m.positions.iter().all(|p| p.is_finite()), "{what}");
-        assert!(m.normals.len() == n && (m.uvs.is_empty() || m.uvs.len() == n), "{what}");
-        assert!(m.normals.iter().all(|p| (p.length() - 1.0).abs() < 1e-4), "{what}");
-        assert!(m.triangles.iter().flatten().all(|&i| (i as usize) < n), "{what}");
-        assert!(m.material < scene.materials.len(), "{what}");
-    }
-    for i in &scene.instances {
-        assert!(i.mesh < scene.meshes.len() && i.world_from_mesh.is_finite(), "{what}");
-        assert!(i.world_from_mesh.inverse().is_finite(), "{what}");
-    }
-    for t in &scene.textures {
-        assert_eq!(t.rgba.len() as u64, u64::from(t.size[0]) * u64::from(t.size[1]), "{what}");
-    }
-}
-
-fn assert_view(scene: &Scene, what: &str) {
-    let view = scene.default_view();
-    assert!(view.eye.is_finite() && view.target.is_finite() && view.eye != view.target, "{what}");
-    assert!(0.0 < view.near && view.near < view.far && view.far.is_finite(), "{what}: {view:?}");
-    let light = scene.light_for_view(&view).light;
-    assert!(light.direction_to_light(view.target).is_finite(), "{what}");
+    damage::damage(&SMALL.iter().map(read).collect::<Vec<_>>());
 }

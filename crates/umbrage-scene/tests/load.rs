@@ -1,5 +1,7 @@
 //! How features of glTF are loaded, and how invalid files are refused, with small files made here.
 
+mod damage;
+
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -207,8 +209,8 @@ fn nodes_nest_and_share_meshes() {
     assert_eq!(corner(1), DVec3::new(-1.0, 0.0, 5.0), "mirrored");
 }
 
-#[test]
-fn instancing_extension_draws_copies() {
+/// The triangle at the origin, and twice as large 5 m beside it, by the instancing extension.
+fn instanced() -> File {
     let mut file = File::triangle();
     let at = file.floats("VEC3", &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
     let scale = file.floats("VEC3", &[1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
@@ -216,7 +218,12 @@ fn instancing_extension_draws_copies() {
         "attributes": {"TRANSLATION": at, "SCALE": scale}
     }});
     file.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
-    let scene = file.load().unwrap();
+    file
+}
+
+#[test]
+fn instancing_extension_draws_copies() {
+    let scene = instanced().load().unwrap();
     assert_eq!(scene.instances.len(), 2);
     let far = scene.instances[1].world_from_mesh.transform_point3(DVec3::X);
     assert_eq!(far, DVec3::new(7.0, 0.0, 0.0));
@@ -537,8 +544,8 @@ fn the_first_light_that_shines_is_the_scenes_own() {
     assert!(matches!(sun.light, Light::Directional { .. }), "{sun:?}");
 }
 
-#[test]
-fn skins_stand_in_the_pose_of_their_joints() {
+/// The triangle between two joints, a million metres away.
+fn skinned() -> File {
     let mut file = File::triangle();
     let joints = file.u16s("VEC4", &[0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0]);
     let weights =
@@ -556,7 +563,12 @@ fn skins_stand_in_the_pose_of_their_joints() {
         {"translation": [1000000, 0, 0], "children": [2]},
         {"translation": [0, 1, 0], "rotation": [0, 0, QUARTER, QUARTER]},
     ]);
-    let scene = file.load().unwrap();
+    file
+}
+
+#[test]
+fn skins_stand_in_the_pose_of_their_joints() {
+    let scene = skinned().load().unwrap();
     let (mesh, instance) = (&scene.meshes[0], scene.instances[0]);
     let world = |i: usize| instance.world_from_mesh.transform_point3(mesh.positions[i].as_dvec3());
     let far = DVec3::X * 1e6;
@@ -734,4 +746,18 @@ fn files_that_are_none_get_an_error() {
     }
     std::fs::write(&path, &good).unwrap();
     assert!(load(&path).is_ok());
+}
+
+/// As third-party scenes are in `fuzz.rs`.
+#[test]
+fn damaged_files_get_an_error_or_load_whole() {
+    let lights = json!([{"type": "spot", "range": 9}, {"type": "point", "color": [1, 0.5, 0]}]);
+    let files = [
+        ("triangle", File::triangle()),
+        ("masked", masked()),
+        ("lit", lit_by(&lights)),
+        ("instanced", instanced()),
+        ("skinned", skinned()),
+    ];
+    damage::damage(&files.map(|(name, file)| (name, file.glb())));
 }

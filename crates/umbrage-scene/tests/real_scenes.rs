@@ -1,10 +1,10 @@
-//! Real scenes, from the folder that `UMBRAGE_SCENES` names (by default `../shared/scenes` beside
-//! the workspace).
+//! Every third-party scene.
 
-use std::path::PathBuf;
+use std::path::Path;
 use umbrage_scene::{Alpha, Scene, load};
+use umbrage_testing::{needs, third_party_scenes};
 
-/// File, stored triangles, drawn triangles, size in metres.
+/// File, triangles stored and drawn, size in metres.
 #[rustfmt::skip]
 const SCENES: &[(&str, u64, u64, [f64; 3])] = &[
     ("atrium/sponza_atrium_reduced.glb", 33_663, 33_663, [27.48, 13.18, 12.56]),
@@ -31,19 +31,11 @@ const SCENES: &[(&str, u64, u64, [f64; 3])] = &[
     ("vehicles/retroufo.glb", 16_428, 16_428, [146.3, 89.33, 146.3]),
 ];
 
-fn folder() -> PathBuf {
-    match std::env::var_os("UMBRAGE_SCENES") {
-        Some(folder) => folder.into(),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
-    }
-}
-
 fn scene(file: &str) -> Scene {
-    let path = folder().join(file);
-    assert!(path.exists(), "{}: missing; set UMBRAGE_SCENES to its folder", path.display());
-    load(&path).unwrap_or_else(|e| panic!("{e}"))
+    load(&Path::new(third_party_scenes!()).join(file)).unwrap_or_else(|e| panic!("{e}"))
 }
 
+#[needs(scenes)]
 #[test]
 fn all_load_with_their_triangles_and_sizes() {
     for &(file, stored, drawn, size) in SCENES {
@@ -69,6 +61,7 @@ fn all_load_with_their_triangles_and_sizes() {
     }
 }
 
+#[needs(scenes)]
 #[test]
 fn leaves_are_masked_by_their_textures() {
     let forest = scene("trees/forest_eztree.glb");
@@ -86,12 +79,14 @@ fn leaves_are_masked_by_their_textures() {
     }
 }
 
+#[needs(scenes)]
 #[test]
 fn instances_share_their_meshes() {
     let dragons = scene("dragon/dragons25_res3.glb");
     assert_eq!((dragons.meshes.len(), dragons.instances.len()), (2, 26));
 }
 
+#[needs(scenes)]
 #[test]
 fn the_barn_brings_its_own_light() {
     let barn = scene("lattice/barn_skylight.glb");
@@ -100,10 +95,10 @@ fn the_barn_brings_its_own_light() {
     assert!((down - glam::DVec3::new(0.5444, 0.8377, -0.0441)).length() < 1e-3, "{down}");
 }
 
+#[needs(scenes)]
 #[test]
 fn figures_stand_in_their_bind_pose() {
-    // CesiumMan's joints turn him upright: he is 1.5 m tall and narrow across the direction of his
-    // walk.
+    // CesiumMan's joints turn him upright: 1.5 m tall and narrow from side to side of his walk.
     let man = scene("characters/CesiumMan.glb").bounds();
     assert!(man.min.y.abs() < 0.02 && (man.max.y - 1.507).abs() < 0.01, "{man:?}");
     let fox = scene("characters/Fox.glb");

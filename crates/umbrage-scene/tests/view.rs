@@ -1,18 +1,13 @@
-//! The views and suns that are chosen for scenes whose files have none.
+//! Views and suns chosen for scenes that bring none.
 
-use glam::{DAffine3, DVec3};
-use std::path::PathBuf;
+use glam::{DAffine3, DVec3, Vec3};
+use std::path::Path;
 use umbrage::{Camera, Light};
-use umbrage_scene::{Scene, SceneCamera, builtin, load};
+use umbrage_scene::{Instance, Mesh, Scene, SceneCamera, builtin, load};
+use umbrage_testing::{needs, third_party_scenes};
 
 fn real(file: &str) -> Scene {
-    let folder = match std::env::var_os("UMBRAGE_SCENES") {
-        Some(folder) => folder.into(),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
-    };
-    let path = folder.join(file);
-    assert!(path.exists(), "{}: missing; set UMBRAGE_SCENES to its folder", path.display());
-    load(&path).unwrap()
+    load(&Path::new(third_party_scenes!()).join(file)).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn camera(view: &SceneCamera) -> Camera {
@@ -24,43 +19,66 @@ fn sun_elevation_deg(scene: &Scene) -> f64 {
     (-direction.normalize().y).asin().to_degrees()
 }
 
+#[needs(scenes)]
 #[test]
 fn objects_are_seen_whole_from_outside() {
     for file in ["dragon/dragon_res4.glb", "vehicles/airplane_pyvista.glb", "characters/Fox.glb"] {
-        let scene = real(file);
-        let (view, bounds) = (scene.default_view(), scene.bounds());
-        let camera = camera(&view);
-        let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for i in &scene.instances {
-            for p in &scene.meshes[i.mesh].positions {
-                let p = i.world_from_mesh.transform_point3(p.as_dvec3());
-                let depth = camera.depth(p);
-                assert!(view.near < depth && depth < view.far, "{file}: {depth} {view:?}");
-                let pixel = camera.pixel(p).unwrap();
-                lo = [lo[0].min(pixel.x), lo[1].min(pixel.y)];
-                hi = [hi[0].max(pixel.x), hi[1].max(pixel.y)];
-            }
+        assert_seen_whole(file, &real(file));
+    }
+}
+
+/// A sphere without its ground, and a tree.
+#[test]
+fn built_in_objects_are_seen_whole_from_outside() {
+    for name in ["sphere", "grove"] {
+        let mut scene = bare(name);
+        let largest = |i: &Instance| scene.meshes[i.mesh].triangles.len();
+        let object = scene.instances.iter().copied().max_by_key(largest).unwrap();
+        scene.instances = vec![object];
+        assert_seen_whole(name, &scene);
+    }
+}
+
+fn assert_seen_whole(file: &str, scene: &Scene) {
+    let (view, bounds) = (scene.default_view(), scene.bounds());
+    let camera = camera(&view);
+    let (mut lo, mut hi) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for i in &scene.instances {
+        for p in &scene.meshes[i.mesh].positions {
+            let p = i.world_from_mesh.transform_point3(p.as_dvec3());
+            let depth = camera.depth(p);
+            assert!(view.near < depth && depth < view.far, "{file}: {depth} {view:?}");
+            let pixel = camera.pixel(p).unwrap();
+            lo = [lo[0].min(pixel.x), lo[1].min(pixel.y)];
+            hi = [hi[0].max(pixel.x), hi[1].max(pixel.y)];
         }
-        assert!(
-            lo[0] > 0.0 && lo[1] > 0.0 && hi[0] < 1280.0 && hi[1] < 720.0,
-            "{file}: {lo:?} {hi:?}"
-        );
-        // The object must not appear too small.
-        assert!(hi[0] - lo[0] > 800.0 || hi[1] - lo[1] > 450.0, "{file}: {lo:?} {hi:?}");
-        assert!(view.eye.y > bounds.min.y, "{file}: from below");
-        assert!((sun_elevation_deg(&scene) - 45.0).abs() < 1e-6, "{file}");
+    }
+    assert!(lo[0] > 0.0 && lo[1] > 0.0 && hi[0] < 1280.0 && hi[1] < 720.0, "{file}: {lo:?} {hi:?}");
+    // And not as a speck.
+    assert!(hi[0] - lo[0] > 800.0 || hi[1] - lo[1] > 450.0, "{file}: {lo:?} {hi:?}");
+    assert!(view.eye.y > bounds.min.y, "{file}: from below");
+    assert!((sun_elevation_deg(scene) - 45.0).abs() < 1e-6, "{file}");
+}
+
+#[needs(scenes)]
+#[test]
+fn rooms_are_seen_from_inside() {
+    for file in ["lattice/barn_skylight.glb", "atrium/sponza_atrium_reduced.glb"] {
+        assert_inside(file, &real(file));
     }
 }
 
 #[test]
-fn rooms_are_seen_from_inside() {
-    for file in ["lattice/barn_skylight.glb", "atrium/sponza_atrium_reduced.glb"] {
-        let scene = real(file);
-        let (eye, b) = (scene.default_view().eye, scene.bounds());
-        assert!(eye.cmpgt(b.min).all() && eye.cmplt(b.max).all(), "{file}: {eye} {b:?}");
-    }
+fn a_built_in_room_is_seen_from_inside() {
+    assert_inside("lantern", &bare("lantern"));
 }
 
+fn assert_inside(file: &str, scene: &Scene) {
+    let (eye, b) = (scene.default_view().eye, scene.bounds());
+    assert!(eye.cmpgt(b.min).all() && eye.cmplt(b.max).all(), "{file}: {eye} {b:?}");
+}
+
+#[needs(scenes)]
 #[test]
 fn worlds_are_stood_in_near_their_ground() {
     for file in [
@@ -71,16 +89,27 @@ fn worlds_are_stood_in_near_their_ground() {
         "city/kenney_city_40x40.glb",
         "terrain/jacksboro_dem_terrain.glb",
     ] {
-        let scene = real(file);
-        let (view, b) = (scene.default_view(), scene.bounds());
-        let inside = view.eye.cmpgt(b.min) & view.eye.cmplt(b.max);
-        assert!(inside.x && inside.z, "{file}: {view:?} {b:?}");
-        assert!(view.eye.y < b.min.y + 1.3 * b.size().y, "{file}: {view:?}");
-        assert!(view.far / view.near <= 1000.0 + 1e-6, "{file}: {view:?}");
-        camera(&view);
+        assert_stood_in(file, &real(file));
     }
 }
 
+#[test]
+fn built_in_worlds_are_stood_in_near_their_ground() {
+    for name in ["town", "airfield", "statues", "grove"] {
+        assert_stood_in(name, &bare(name));
+    }
+}
+
+fn assert_stood_in(file: &str, scene: &Scene) {
+    let (view, b) = (scene.default_view(), scene.bounds());
+    let inside = view.eye.cmpgt(b.min) & view.eye.cmplt(b.max);
+    assert!(inside.x && inside.z, "{file}: {view:?} {b:?}");
+    assert!(view.eye.y < b.min.y + 1.3 * b.size().y, "{file}: {view:?}");
+    assert!(view.far / view.near <= 1000.0 + 1e-6, "{file}: {view:?}");
+    camera(&view);
+}
+
+#[needs(scenes)]
 #[test]
 fn gentle_land_gets_a_low_sun_and_a_scene_its_own_light() {
     assert!(sun_elevation_deg(&real("terrain/jacksboro_dem_terrain.glb")) < 26.0);
@@ -88,7 +117,35 @@ fn gentle_land_gets_a_low_sun_and_a_scene_its_own_light() {
     assert_eq!(barn.default_light(), barn.lights[0]);
 }
 
-/// A built-in scene without its camera and sun, transformed.
+/// Hills of 4 m in a square of 200 m.
+#[test]
+fn hills_get_a_low_sun() {
+    let mut scene = bare("pole");
+    let height = |x: f32, z: f32| 4.0 * (x / 30.0).sin() * (z / 40.0).cos();
+    let side = 0..=100u16;
+    let points = side
+        .clone()
+        .flat_map(|i| side.clone().map(move |k| [i, k].map(|c| 2.0 * f32::from(c) - 100.0)));
+    let quads = (0..100u32).flat_map(|i| (0..100).map(move |k| 101 * i + k));
+    scene.meshes = vec![Mesh {
+        positions: points.map(|[x, z]| Vec3::new(x, height(x, z), z)).collect(),
+        normals: vec![Vec3::Y; 101 * 101],
+        triangles: quads.flat_map(|a| [[a, a + 1, a + 101], [a + 1, a + 102, a + 101]]).collect(),
+        ..Mesh::default()
+    }];
+    scene.instances = vec![Instance { mesh: 0, world_from_mesh: DAffine3::IDENTITY }];
+    assert!(sun_elevation_deg(&scene) < 26.0, "{}", sun_elevation_deg(&scene));
+}
+
+/// A built-in scene without its camera and light.
+fn bare(name: &str) -> Scene {
+    let mut scene = builtin(name, None).unwrap();
+    scene.cameras.clear();
+    scene.lights.clear();
+    scene
+}
+
+/// A built-in world without its camera and sun, moved.
 fn moved(world_from_scene: DAffine3) -> Scene {
     let mut scene = builtin("statues", Some(3)).unwrap();
     scene.cameras.clear();

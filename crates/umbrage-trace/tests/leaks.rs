@@ -5,11 +5,12 @@ mod common;
 
 use common::nobody;
 use glam::DVec2;
-use std::path::PathBuf;
+use std::path::Path;
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, texel_coordinates};
 use umbrage::{Bounds, Camera, Plan, Planner, Receiver, Technique, Warp};
 use umbrage_scene::Scene;
+use umbrage_testing::{needs, third_party_scenes};
 use umbrage_trace::{DepthMap, Reference, Tracer, View};
 
 const BLUR: Blur = Blur::Texels(7);
@@ -107,16 +108,12 @@ fn a_fence_leaks_a_tenth_of_what_variance_does() {
 
 /// In a lattice, surfaces lie behind surfaces, so there are points where all that the blur covers
 /// is in shadow.
+#[needs(scenes)]
 #[test]
 fn a_lattice_leaks_a_tenth_of_what_variance_does() {
-    let folder = std::env::var_os("UMBRAGE_SCENES").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
-        PathBuf::from,
-    );
-    let load = |name: &str| {
-        umbrage_scene::load(&folder.join(name))
-            .unwrap_or_else(|e| panic!("{name}: {e} (set UMBRAGE_SCENES to the real scenes)"))
-    };
+    let folder = Path::new(third_party_scenes!());
+    let load =
+        |name: &str| umbrage_scene::load(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
     let statistics = [Statistic::Vsm(Vsm::default()), csm(8, false), csm(16, false)];
     let dark = leaks(&load("lattice/lattice_ball.glb"), &statistics);
     let dark: Vec<f64> = dark.into_iter().map(|[_, dark]| dark).collect();

@@ -1,52 +1,58 @@
-//! Rays in real scenes, from the folder that `UMBRAGE_SCENES` names.
+//! Whole scenes, third-party and built-in ones.
 
 mod common;
 
 use common::{Random, all_hits, nobody};
 use glam::DVec3;
-use std::path::PathBuf;
+use std::path::Path;
 use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique};
 use umbrage_scene::Scene;
+use umbrage_testing::{needs, third_party_scenes};
 use umbrage_trace::{Ray, Reference, Tracer, View};
 
 fn load(name: &str) -> Scene {
-    let folder = std::env::var_os("UMBRAGE_SCENES").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
-    umbrage_scene::load(&path).unwrap_or_else(|e| {
-        panic!("{}: {e} (set UMBRAGE_SCENES to the folder of real scenes)", path.display())
-    })
+    let path = Path::new(third_party_scenes!()).join(name);
+    umbrage_scene::load(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
+#[needs(scenes)]
 #[test]
 fn no_hit_is_lost_in_real_scenes() {
     for name in ["atrium/sponza_atrium_reduced.glb", "vehicles/muscle_car.glb", "house/house.glb"] {
-        let scene = load(name);
-        let tracer = Tracer::new(&scene).unwrap().opaque(true);
-        let bounds = tracer.bounds();
-        let mut random = Random(1);
-        let mut point = || bounds.min + bounds.size() * (random.vector(0.5) + 0.5);
-        let mut clear = 0;
-        for _ in 0..150 {
-            let origin = point();
-            let ray = Ray { origin, direction: point() - origin };
-            let hits = all_hits(&scene, ray);
-            let found = tracer.closest(ray, [0.0, f64::INFINITY]);
-            assert!(found.is_some() || hits.iter().all(|h| h.2 < 1e-6), "{name}: {ray:?}");
-            let (Some(found), Some(&(t, _, margin))) = (found, hits.first()) else { continue };
-            // Real scenes repeat triangles, so only the distance can be compared, not which
-            // triangle is hit.
-            if margin > 1e-6 {
-                clear += 1;
-                assert!((found.t - t).abs() < 1e-9 * t.max(1.0), "{name}: {ray:?} {t} {found:?}");
-            }
-        }
-        assert!(clear > 75, "{name}: only {clear} hits");
+        no_hit_is_lost(name, &load(name));
     }
 }
 
+#[test]
+fn no_hit_is_lost_in_built_in_scenes() {
+    for name in ["fence", "lantern", "grove"] {
+        no_hit_is_lost(name, &umbrage_scene::builtin(name, Some(1)).unwrap());
+    }
+}
+
+fn no_hit_is_lost(name: &str, scene: &Scene) {
+    let tracer = Tracer::new(scene).unwrap().opaque(true);
+    let bounds = tracer.bounds();
+    let mut random = Random(1);
+    let mut point = || bounds.min + bounds.size() * (random.vector(0.5) + 0.5);
+    let mut clear = 0;
+    for _ in 0..150 {
+        let origin = point();
+        let ray = Ray { origin, direction: point() - origin };
+        let hits = all_hits(scene, ray);
+        let found = tracer.closest(ray, [0.0, f64::INFINITY]);
+        assert!(found.is_some() || hits.iter().all(|h| h.2 < 1e-6), "{name}: {ray:?}");
+        let (Some(found), Some(&(t, _, margin))) = (found, hits.first()) else { continue };
+        // Real scenes repeat triangles: compare where, not which.
+        if margin > 1e-6 {
+            clear += 1;
+            assert!((found.t - t).abs() < 1e-9 * t.max(1.0), "{name}: {ray:?} {t} {found:?}");
+        }
+    }
+    assert!(clear > 75, "{name}: only {clear} hits");
+}
+
+#[needs(scenes)]
 #[test]
 fn a_real_level_comes_out_right() {
     // 2048² texels on a view of cars and stands, with alpha masks ignored. Engines of 2026 with
@@ -64,7 +70,19 @@ fn a_real_level_comes_out_right() {
     })
     .unwrap();
     let light = Light::Directional { direction: DVec3::new(-0.57923, -0.707, -0.40558) };
-    let view = View::new(&tracer, camera, light, 1).unwrap();
+    comes_out_right(&tracer, camera, light);
+}
+
+#[test]
+fn a_built_in_world_comes_out_right() {
+    let scene = umbrage_scene::builtin("airfield", None).unwrap();
+    let tracer = Tracer::new(&scene).unwrap();
+    let camera = Camera::look_at(scene.default_view().look_at([480, 270])).unwrap();
+    comes_out_right(&tracer, camera, scene.default_light().light);
+}
+
+fn comes_out_right(tracer: &Tracer<'_>, camera: Camera, light: Light) {
+    let view = View::new(tracer, camera, light, 1).unwrap();
     let band = view.band(0..270, &nobody);
     let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());
     let bounds = Bounds::of_scene(tracer.bounds());
@@ -72,7 +90,7 @@ fn a_real_level_comes_out_right() {
     for text in ["adaptive@2048", "adaptive:pcf2@2048"] {
         let technique: Technique = text.parse().unwrap();
         let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
-        let reference = Reference::render(&tracer, plan, &nobody).unwrap();
+        let reference = Reference::render(tracer, plan, &nobody).unwrap();
         let lit = band.map(|s| reference.visibility(0, s), &nobody);
         let lit = band.means_facing(&lit, camera.far());
         let pairs = truth.iter().zip(&lit).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));

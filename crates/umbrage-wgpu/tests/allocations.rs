@@ -6,6 +6,7 @@ use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Partition, Planner, Technique};
+use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Support, Timestamps};
 
 struct Counting;
@@ -31,6 +32,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
+#[needs(gpu)]
 #[test]
 fn a_still_frame_allocates_nothing() {
     let instance = wgpu::Instance::default();

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{WARPS, config, map_count, partition, planner, possible, technique};
+use common::{Spread, WARPS, config, map_count, partition, planner, possible, technique};
 use proptest::prelude::*;
 use umbrage::{Aabb, Light, Objective, Technique, Warp};
 
@@ -106,6 +106,15 @@ proptest! {
 /// its edges, which brute force finds from all triples and pairs of its planes.
 #[test]
 fn maxima_are_reached() {
+    // Each core takes its share of the warps, over the same cases.
+    std::thread::scope(|scope| {
+        for spreads in WARPS.chunks(3) {
+            scope.spawn(|| check_maxima(spreads));
+        }
+    });
+}
+
+fn check_maxima(spreads: &[(&str, Spread)]) {
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         cases: 10_000,
         failure_persistence: None,
@@ -118,7 +127,7 @@ fn maxima_are_reached() {
             let corners = config.corners();
             prop_assume!(corners.len() >= 4);
             let mut planner = planner();
-            for (name, spread) in WARPS {
+            for &(name, spread) in spreads {
                 let plan = planner
                     .plan(&config.camera, &[config.light], &config.bounds, &technique(spread))
                     .unwrap();

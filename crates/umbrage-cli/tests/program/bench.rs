@@ -1,11 +1,13 @@
 //! `umbrage bench` and `umbrage devices`.
 
 use crate::desk::{Desk, keys};
+use umbrage_testing::needs;
 
 fn words(text: &str) -> Vec<&str> {
     text.split_whitespace().collect()
 }
 
+#[needs(gpu)]
 #[test]
 fn every_stage_has_its_times() {
     let desk = Desk::new();
@@ -36,6 +38,7 @@ fn every_stage_has_its_times() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn what_stands_still_has_no_depth_pass() {
     let desk = Desk::new();
@@ -48,6 +51,7 @@ fn what_stands_still_has_no_depth_pass() {
     assert!(table.starts_with("median ms of") && table.contains("adaptive+z2@64"), "{table}");
 }
 
+#[needs(gpu)]
 #[test]
 fn devices_say_what_they_can_do() {
     let desk = Desk::new();

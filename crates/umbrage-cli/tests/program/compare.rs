@@ -1,8 +1,10 @@
 use crate::desk::{Desk, keys, listing, shared_scene};
 use serde_json::Value;
+use umbrage_testing::needs;
 
 const SMALL: [&str; 2] = ["--size", "96x54"];
 
+#[needs(gpu)]
 #[test]
 fn the_report_has_all_that_is_documented() {
     let desk = Desk::new();
@@ -223,6 +225,7 @@ fn a_scene_lit_by_a_point_light_compares() {
     assert!(page.contains("“flame”, point at (0, 2.35, 0) m"));
 }
 
+#[needs(scenes)]
 #[test]
 fn real_scenes_compare() {
     // Of each kind one: cards with holes, instances, a room, a city, thirty kilometres of land.
@@ -234,30 +237,40 @@ fn real_scenes_compare() {
         "terrain/jacksboro_dem_terrain.glb",
         "atrium/sponza_atrium_reduced.glb",
     ] {
-        let desk = Desk::new();
-        let path = shared_scene(scene);
-        let json = desk.json(
-            &[
-                &[
-                    "compare",
-                    &path,
-                    "-o",
-                    "report",
-                    "--json",
-                    "--shadows",
-                    "unfocused@256",
-                    "--shadows",
-                    "adaptive@1024",
-                ],
-                &SMALL[..],
-            ]
-            .concat(),
-        );
-        let figure = |i: usize, name: &str| json["results"][i][name].as_f64().unwrap();
-        assert!(figure(0, "counted_pixels") > 200.0, "{scene}: the sun must reach what is seen");
-        let [poor, good] = [0, 1].map(|i| figure(i, "wrong_fraction"));
-        assert!(good < poor && good < 0.2, "{scene}: {good} against {poor}");
+        compares(&shared_scene(scene));
     }
+}
+
+#[test]
+fn built_in_worlds_compare() {
+    for scene in ["town", "airfield", "statues", "grove"] {
+        compares(scene);
+    }
+}
+
+fn compares(scene: &str) {
+    let desk = Desk::new();
+    let json = desk.json(
+        &[
+            &[
+                "compare",
+                scene,
+                "-o",
+                "report",
+                "--json",
+                "--shadows",
+                "unfocused@256",
+                "--shadows",
+                "adaptive@1024",
+            ],
+            &SMALL[..],
+        ]
+        .concat(),
+    );
+    let figure = |i: usize, name: &str| json["results"][i][name].as_f64().unwrap();
+    assert!(figure(0, "counted_pixels") > 200.0, "{scene}: the sun must reach what is seen");
+    let [poor, good] = [0, 1].map(|i| figure(i, "wrong_fraction"));
+    assert!(good < poor && good < 0.2, "{scene}: {good} against {poor}");
 }
 
 #[test]

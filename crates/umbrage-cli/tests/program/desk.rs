@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use umbrage_testing::third_party_scenes;
 
 /// An empty folder, the program's working directory.
 pub(crate) struct Desk {
@@ -71,17 +72,11 @@ pub(crate) fn listing(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A file of the shared scenes.
+/// A file of the third-party scenes.
 pub(crate) fn shared_scene(name: &str) -> String {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/scenes");
-    let folder = std::env::var("UMBRAGE_SCENES").unwrap_or_else(|_| default.into());
-    let path = Path::new(&folder).join(name);
-    assert!(
-        path.is_file(),
-        "{} is missing: these tests need the shared scenes; set UMBRAGE_SCENES to their folder",
-        path.display()
-    );
-    path.canonicalize().unwrap().into_os_string().into_string().unwrap()
+    let path = Path::new(third_party_scenes!()).join(name);
+    let path = path.canonicalize().unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    path.into_os_string().into_string().unwrap()
 }
 
 /// The keys of a JSON object, sorted.

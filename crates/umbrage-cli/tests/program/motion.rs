@@ -3,6 +3,7 @@
 use crate::bad_input::refuses;
 use crate::desk::{Desk, STAGE_GLTF, shared_scene};
 use serde_json::{Value, json};
+use umbrage_testing::needs;
 
 const TECHNIQUES: [&str; 8] = [
     "--shadows",
@@ -113,6 +114,7 @@ fn motions_that_cannot_be() {
 
 /// A forest far away, where many texels fall into a pixel (Annen et al. 2007, Fig. 10): numbers filtered as wide as the pixel sparkle a third of what bilinear
 /// comparisons do at most.
+#[needs(scenes)]
 #[test]
 fn filtered_numbers_do_not_sparkle_where_comparisons_do() {
     let desk = Desk::new();
@@ -124,7 +126,7 @@ fn filtered_numbers_do_not_sparkle_where_comparisons_do() {
         "report",
         "--json",
         "--size",
-        "240x135",
+        "120x68",
         "--eye",
         "-178,178,400",
         "--target",
@@ -158,7 +160,7 @@ fn noise_has_a_picture() {
             "--aov",
             "minification",
             "--size",
-            "96x54",
+            "48x27",
             "--shadows",
             technique,
         ]);

@@ -1,5 +1,6 @@
 use crate::desk::{Desk, STAGE_GLTF};
 use image::{ColorType, GenericImageView};
+use umbrage_testing::needs;
 
 const AOVS: [&str; 9] = [
     "color",
@@ -96,8 +97,7 @@ fn a_point_light_shines_on_a_disc() {
 #[test]
 fn masks_are_ignored_only_if_told() {
     let desk = Desk::new();
-    let house = crate::desk::shared_scene("house/house.glb");
-    let common = ["render", &house, "--aov", "truth", "--size", "64x36", "--samples", "1"];
+    let common = ["render", "grove", "--aov", "truth", "--size", "64x36", "--samples", "1"];
     desk.succeed(&[&common[..], &["-o", "masked.png"]].concat());
     desk.succeed(&[&common[..], &["-o", "solid.png", "--opaque"]].concat());
     let [masked, solid] =
@@ -140,6 +140,7 @@ fn an_existing_picture_is_replaced_and_nothing_is_left_beside_it() {
     assert_eq!(desk.listing(), ["p.png"]);
 }
 
+#[needs(gpu)]
 #[test]
 fn auto_says_what_it_takes_and_others_do_not() {
     let desk = Desk::new();
@@ -157,6 +158,7 @@ fn auto_says_what_it_takes_and_others_do_not() {
 }
 
 /// Every kind of picture, from both.
+#[needs(gpu)]
 #[test]
 fn backends_agree() {
     let desk = Desk::new();

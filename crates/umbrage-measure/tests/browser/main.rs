@@ -8,6 +8,7 @@ use demo::{Compared, flat, spheres_on_a_plane};
 use serde_json::json;
 use std::path::PathBuf;
 use umbrage_measure::{Report, Rgb, Sweep, SweepPage, SweepSettings, SweptView, write_sweep};
+use umbrage_testing::needs;
 
 const RED: Rgb = [220, 30, 20];
 const GREEN: Rgb = [20, 160, 60];
@@ -73,6 +74,7 @@ fn seen(browser: &mut Browser, [x, y]: [f64; 2]) -> Rgb {
     sum.map(|s| (s / 9) as u8)
 }
 
+#[needs(browser)]
 #[test]
 fn pictures_load_and_everything_fits_at_every_size() {
     let mut browser = Browser::start();
@@ -94,6 +96,7 @@ fn pictures_load_and_everything_fits_at_every_size() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn divider_moves_by_mouse_touch_and_keyboard() {
     let (index, _) = report("divider", &flat([64, 48], RED, &[("uniform", GREEN)]));
@@ -139,6 +142,7 @@ fn divider_moves_by_mouse_touch_and_keyboard() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn controls_choose_what_is_shown() {
     let compared = flat([64, 48], RED, &[("uniform@64", GREEN), ("lispsm@64", BLUE)]);
@@ -202,6 +206,7 @@ fn controls_choose_what_is_shown() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn magnifier_shows_the_same_place_of_all_techniques() {
     // The upper left quarter of each picture has the technique's colour, and the rest is black.
@@ -255,6 +260,7 @@ fn magnifier_shows_the_same_place_of_all_techniques() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn table_sorts_by_every_column() {
     let (index, report) = report("table", &spheres_on_a_plane([96, 54], 20));
@@ -303,6 +309,7 @@ fn table_sorts_by_every_column() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn text_of_users_stays_text() {
     let nasty = "</script><script>window.owned=1</script><img src=x onerror=owned=1>'\"&<!--";
@@ -322,6 +329,7 @@ fn text_of_users_stays_text() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn works_without_scripts_and_on_paper() {
     let (index, report) = report("paper", &spheres_on_a_plane([96, 54], 5));
@@ -349,6 +357,7 @@ fn works_without_scripts_and_on_paper() {
     check_quiet(&browser);
 }
 
+#[needs(browser)]
 #[test]
 fn a_sweeps_page_leads_to_its_views() {
     let nasty = "<img src=x onerror=owned=1>'\"&<!--";

@@ -15,12 +15,13 @@
 mod bare;
 
 use bare::BareDepth;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Bounds, Camera, Light, Plan, Planner, Technique};
 use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
 use umbrage_scene::Scene;
+use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
@@ -190,10 +191,7 @@ fn main() -> Result<(), Failure> {
     }
     let gpu = Gpu::open()?;
     println!("{}", gpu.info().name);
-    let folder = std::env::var_os("UMBRAGE_SCENES").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes"),
-        PathBuf::from,
-    );
+    let folder = Path::new(third_party_scenes!());
     let mut scenes = Vec::new();
     for name in ["town", "airfield", "statues"] {
         scenes.push(umbrage_scene::builtin(name, None)?);

@@ -1,36 +1,29 @@
-//! Tests on a real device, or on lavapipe if there is no other. Without any device they fail;
-//! `tools/setup` installs lavapipe.
+//! On a real device, lavapipe where there is no other.
 
 mod parity;
 mod pictures;
 mod trouble;
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::LazyLock;
 use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner, Technique};
 use umbrage_render::Gpu;
 use umbrage_scene::Scene;
+use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 
 /// The device that all tests share.
 pub(crate) static GPU: LazyLock<Gpu> =
     LazyLock::new(|| Gpu::open().expect("a GPU, or a driver in software: run tools/setup"));
 
-/// A scene by name: a file of the shared scenes, or a built-in scene.
+/// A scene by name: a file of the third-party scenes, or built in.
 pub(crate) fn scene(name: &str) -> Scene {
     if !name.ends_with(".glb") {
         let (name, size) = name.split_once(':').unwrap_or((name, ""));
         return umbrage_scene::builtin(name, size.parse().ok()).unwrap();
     }
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/scenes");
-    let folder = std::env::var_os("UMBRAGE_SCENES").map_or(PathBuf::from(default), PathBuf::from);
-    let path = folder.join(name);
-    assert!(
-        path.is_file(),
-        "{} is missing: these tests need the shared scenes; set UMBRAGE_SCENES to their folder",
-        path.display()
-    );
-    umbrage_scene::load(&path).unwrap()
+    let path = Path::new(third_party_scenes!()).join(name);
+    umbrage_scene::load(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A scene with its default view, prepared for ray tracing.
@@ -39,6 +32,7 @@ pub(crate) struct Set<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) camera: Camera,
     boxes: Vec<Aabb>,
+    light: Light,
 }
 
 impl<'a> Set<'a> {
@@ -47,11 +41,13 @@ impl<'a> Set<'a> {
         let v = scene.default_view();
         let look = v.look_at(image);
         let boxes = tracer.boxes(64);
-        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes }
+        // Choosing view and light takes seconds in a large scene that brings none.
+        let light = scene.light_for_view(&v).light;
+        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes, light }
     }
 
     pub(crate) fn light(&self) -> Light {
-        self.scene.default_light().light
+        self.light
     }
 
     pub(crate) fn plan(&self, lights: &[Light], technique: &Technique) -> Plan {

@@ -1,11 +1,12 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
 use crate::{GPU, Set, scene};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
-use umbrage::{Camera, Light, Plan, SpotLight, Technique};
+use umbrage::{Camera, Light, Plan, Size, SpotLight, Technique};
 use umbrage_render::{Look, Renderer, Sample, SceneBuffers};
+use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
 
@@ -28,6 +29,11 @@ const TECHNIQUES: [&str; 10] = [
 /// A technique of the list with another filter.
 fn technique(text: &str, filter: Filter) -> Technique {
     Technique { filter, ..text.parse().unwrap() }
+}
+
+/// One of the techniques with about half of the texels, for tests of many filters.
+fn small(index: usize, filter: Filter) -> Technique {
+    Technique { size: Size::Budget(384 * 384), ..technique(TECHNIQUES[index], filter) }
 }
 
 /// Numbers of counted samples in which the pictures of the GPU and the reference differ.
@@ -150,65 +156,99 @@ fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     check(name, technique, &difference);
 }
 
+#[needs(gpu)]
 #[test]
 fn in_a_town() {
     agrees("town:40", 0..TECHNIQUES.len());
 }
 
+#[needs(gpu)]
 #[test]
 fn on_an_airfield() {
     agrees("airfield", [1, 3, 5, 7]);
 }
 
+#[needs(gpu)]
 #[test]
 fn among_statues() {
     agrees("statues", [0, 4, 8]);
 }
 
+#[needs(gpu)]
 #[test]
 fn in_a_grove() {
     agrees("grove", [2, 6, 9]);
 }
 
+#[needs(gpu)]
 #[test]
 fn at_a_fence() {
     agrees("fence", [1, 4, 7]);
 }
 
 /// A point light, which has six or more maps.
+#[needs(gpu)]
 #[test]
 fn around_a_lantern() {
     agrees("lantern", [1, 4, 7, 9]);
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn on_a_race_track() {
     agrees("vehicles/kenney_racing_level.glb", [2, 3, 5, 8]);
 }
 
 /// Casters with alpha masks.
+#[needs(gpu, scenes)]
 #[test]
 fn in_a_forest() {
     agrees("trees/forest_eztree.glb", [0, 6, 7]);
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn in_an_atrium() {
     agrees("atrium/sponza_atrium_reduced.glb", [1, 5, 9]);
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn over_kilometres_of_terrain() {
     agrees("terrain/jacksboro_dem_terrain.glb", [3, 4, 8]);
 }
 
+#[needs(gpu, scenes)]
 #[test]
 fn in_a_house_of_centimetres() {
     agrees("house/house.glb", [2, 4, 6]);
 }
 
+/// A world of centimetres and one of kilometres.
+#[needs(gpu)]
+#[test]
+fn at_any_scale() {
+    for scale in [0.01, 1000.0] {
+        let mut scene = scene("statues");
+        for instance in &mut scene.instances {
+            let scaled = DAffine3::from_scale(DVec3::splat(scale));
+            instance.world_from_mesh = scaled * instance.world_from_mesh;
+        }
+        for camera in &mut scene.cameras {
+            [camera.eye, camera.target] = [camera.eye, camera.target].map(|p| p * scale);
+            [camera.near, camera.far] = [camera.near, camera.far].map(|d| d * scale);
+        }
+        let set = Set::new(&scene, IMAGE);
+        for index in [2, 4, 8] {
+            let technique = technique(TECHNIQUES[index], Filter::Hard);
+            agrees_with(&format!("statues x {scale}"), &set, &technique);
+        }
+    }
+}
+
 /// Whatever features a device lacks, the picture is the same, except for the accuracy that
 /// comparisons by the texture unit cost.
+#[needs(gpu)]
 #[test]
 fn every_fallback_draws_the_same_picture() {
     let scene = scene("town:20");
@@ -245,9 +285,20 @@ fn every_fallback_draws_the_same_picture() {
     }
 }
 
-/// Every prefilter in four scenes, under a uniform map, a warp and slices.
+#[needs(gpu)]
 #[test]
-fn every_prefilter_in_four_scenes() {
+fn every_prefilter_in_three_scenes() {
+    every_prefilter(&["town:20", "fence", "lantern"]);
+}
+
+#[needs(gpu, scenes)]
+#[test]
+fn every_prefilter_in_a_forest() {
+    every_prefilter(&["trees/forest_eztree.glb"]);
+}
+
+/// Every prefilter, under a uniform map, a warp and slices.
+fn every_prefilter(scenes: &[&str]) {
     let csm = |m| Statistic::Csm(Csm::new(m, 0.0, false, true).unwrap());
     let statistics = [
         Statistic::Vsm(Vsm::default()),
@@ -258,26 +309,37 @@ fn every_prefilter_in_four_scenes() {
         csm(4),
         csm(16),
     ];
-    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+    for name in scenes {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         for (i, statistic) in statistics.into_iter().enumerate() {
             let half = i % 2 == 1;
             let filter = Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(5), half });
-            agrees_with(name, &set, &technique(TECHNIQUES[[1, 4, 7][i % 3]], filter));
+            agrees_with(name, &set, &small([1, 4, 7][i % 3], filter));
         }
     }
 }
 
-/// Widths in pixels and in metres, which use mip levels and several samples along a footprint.
+#[needs(gpu)]
 #[test]
-fn every_width_in_four_scenes() {
+fn every_width_in_three_scenes() {
+    every_width(&["town:20", "fence", "lantern"]);
+}
+
+#[needs(gpu, scenes)]
+#[test]
+fn every_width_in_a_forest() {
+    every_width(&["trees/forest_eztree.glb"]);
+}
+
+/// Widths in pixels and in metres, which use mip levels and several samples along a footprint.
+fn every_width(scenes: &[&str]) {
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
     let prefilter = |statistic, width| {
         let half = width == Width::Metres(0.6);
         Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width), half })
     };
-    for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
+    for name in scenes {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
         // A diameter of 0.3: per metre of distance for a sun, in metres for a spot or point light.
@@ -294,12 +356,13 @@ fn every_width_in_four_scenes() {
             prefilter(Statistic::Msm(Msm::default()), Width::Metres(3.0)),
         ];
         for (i, filter) in filters.into_iter().enumerate() {
-            agrees_with(name, &set, &technique(TECHNIQUES[[1, 4, 7][i % 3]], filter));
+            agrees_with(name, &set, &small([1, 4, 7][i % 3], filter));
         }
     }
 }
 
 /// A directional, a spot and a point light in one plan, each looked up separately.
+#[needs(gpu)]
 #[test]
 fn several_lights_share_a_plan() {
     let scene = scene("lantern");
@@ -328,6 +391,7 @@ fn several_lights_share_a_plan() {
 
 /// Far from the world's origin, the matrices of the camera, the maps and the instances keep their
 /// precision.
+#[needs(gpu)]
 #[test]
 fn a_million_metres_from_the_origin() {
     let mut scene = scene("pole");

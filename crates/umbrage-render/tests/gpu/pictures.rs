@@ -3,6 +3,7 @@
 use crate::{GPU, Set, scene};
 use umbrage::{Partition, Technique};
 use umbrage_render::{FrameTarget, Look, Renderer, SceneBuffers, Timer};
+use umbrage_testing::needs;
 use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
 use wgpu::{BufferUsages, MapMode, PollType};
@@ -39,6 +40,7 @@ fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
 
 /// The shader's tone mapping and the texture's encoding agree with those of the reference's
 /// pictures.
+#[needs(gpu)]
 #[test]
 fn a_frame_looks_as_its_samples_do() {
     let scene = scene("town:20");
@@ -64,6 +66,7 @@ fn a_frame_looks_as_its_samples_do() {
 }
 
 /// Tiles, rows and grids only select samples.
+#[needs(gpu)]
 #[test]
 fn samples_are_those_of_a_larger_picture() {
     let scene = scene("sphere");
@@ -95,6 +98,7 @@ fn samples_are_those_of_a_larger_picture() {
 }
 
 /// Maps that do not change are not drawn again by the renderer.
+#[needs(gpu)]
 #[test]
 fn still_maps_are_drawn_once() {
     let scene = scene("fence");

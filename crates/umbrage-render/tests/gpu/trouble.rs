@@ -3,8 +3,10 @@
 use crate::{GPU, Set, scene};
 use umbrage::{Size, Technique, Warp};
 use umbrage_render::{Error, FrameTarget, Gpu, Look, Renderer, SceneBuffers, devices};
+use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
+#[needs(gpu)]
 #[test]
 fn devices_are_listed_the_best_first() {
     let devices = devices();
@@ -13,6 +15,7 @@ fn devices_are_listed_the_best_first() {
     assert_eq!(first.support, Ok(GPU.support()));
 }
 
+#[needs(gpu)]
 #[test]
 fn a_lost_device_is_reported() {
     let gpu = Gpu::open().unwrap();
@@ -31,6 +34,7 @@ fn a_lost_device_is_reported() {
     renderer.draw_maps(&plan, Casters::Moved, None).map_or_else(lost, drop);
 }
 
+#[needs(gpu)]
 #[test]
 fn what_is_too_large_is_named() {
     let scene = scene("pole");

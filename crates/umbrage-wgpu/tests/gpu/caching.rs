@@ -4,6 +4,7 @@ use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
 use umbrage::{Aabb, Partition, Plan, Planner, Size, Technique, Warp};
+use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 fn shadows(bench: &Bench, layout: Layout) -> Shadows {
@@ -29,6 +30,7 @@ fn drawn(bench: &Bench, shadows: &mut Shadows, plan: &Plan, casters: Casters<'_>
     drawn
 }
 
+#[needs(gpu)]
 #[test]
 fn what_stands_still_is_drawn_once() {
     let bench = bench();
@@ -44,6 +46,7 @@ fn what_stands_still_is_drawn_once() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn what_moves_is_drawn_into_the_maps_it_casts_into() {
     let bench = bench();
@@ -63,6 +66,7 @@ fn what_moves_is_drawn_into_the_maps_it_casts_into() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
     let bench = bench();
@@ -74,6 +78,7 @@ fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
 }
 
 /// Redrawing one map of an atlas clears that map and leaves the others.
+#[needs(gpu)]
 #[test]
 fn a_map_that_is_redrawn_leaves_its_neighbours() {
     let bench = bench();
@@ -122,6 +127,7 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
 }
 
 /// Ever other views: sizes change all the time, and what moves the texture is drawn anew.
+#[needs(gpu)]
 #[test]
 fn a_camera_that_wanders_needs_few_textures() {
     let bench = bench();
@@ -154,6 +160,7 @@ fn a_camera_that_wanders_needs_few_textures() {
 }
 
 /// A camera that sees nothing gets no maps, no pass, and full light; then it sees again.
+#[needs(gpu)]
 #[test]
 fn empty_maps_cost_nothing() {
     let bench = bench();

@@ -4,6 +4,7 @@ use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::cast_slice;
 use glam::{DAffine3, DVec3, Vec3};
 use umbrage::{Partition, Size, Technique, Warp};
+use umbrage_testing::needs;
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
     Timestamps,
@@ -168,6 +169,7 @@ fn agree(warp: Warp, drawn: Drawn) {
     assert!(far * 1000 <= native.len(), "{warp:?} {drawn:?}: {far} of {}", native.len());
 }
 
+#[needs(gpu)]
 #[test]
 fn emulated_clamping_gives_the_same_depths() {
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Psm] {
@@ -175,6 +177,7 @@ fn emulated_clamping_gives_the_same_depths() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn one_shader_of_the_users_own_is_right_on_all_devices() {
     for drawn in [Drawn::OwnVertex, Drawn::OwnFragment] {
@@ -184,6 +187,7 @@ fn one_shader_of_the_users_own_is_right_on_all_devices() {
 
 /// A vertex stage that drops the caster's depth is refused by devices that need it, and by all of
 /// them in builds with debug assertions.
+#[needs(gpu)]
 #[test]
 fn a_caster_without_its_depth_is_an_error() {
     let bench = bench();

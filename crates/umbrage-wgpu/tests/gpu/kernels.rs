@@ -9,6 +9,7 @@ use umbrage::visibility::{
     Blur, Filter, LightSize, Pattern, Prefilter, Width, texel_coordinates, visibility,
 };
 use umbrage::{Faces, Plan, Technique};
+use umbrage_testing::needs;
 use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -205,6 +206,7 @@ fn agrees_to(
     assert!(wrong * one_in <= served, "{shadow_options:?} {technique}: {wrong} of {served}");
 }
 
+#[needs(gpu)]
 #[test]
 fn every_technique_is_looked_up_as_in_rust() {
     for text in TECHNIQUES {
@@ -212,6 +214,7 @@ fn every_technique_is_looked_up_as_in_rust() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn every_filter_and_layout_is_looked_up_as_in_rust() {
     let technique = technique("lispsm+z2@256");
@@ -228,6 +231,7 @@ fn every_filter_and_layout_is_looked_up_as_in_rust() {
 }
 
 /// Widths in pixels and metres, soft shadows: of the many texels that a point compares, one may lie on a border.
+#[needs(gpu)]
 #[test]
 fn comparisons_over_a_width_are_those_of_rust() {
     let technique = technique("lispsm+z2@256");
@@ -244,6 +248,7 @@ fn comparisons_over_a_width_are_those_of_rust() {
 }
 
 /// Numbers in smaller and smaller copies, at several places: in single precision, and in 8 bits to what these can tell.
+#[needs(gpu)]
 #[test]
 fn numbers_over_a_width_are_those_of_rust() {
     let technique = technique("lispsm+z2@256");
@@ -260,6 +265,7 @@ fn numbers_over_a_width_are_those_of_rust() {
     }
 }
 
+#[needs(gpu)]
 #[test]
 fn render_space_may_begin_anywhere_near() {
     let technique = technique("lispsm+z2@256");
@@ -269,6 +275,7 @@ fn render_space_may_begin_anywhere_near() {
 
 /// On receivers that face the light all texels are compared with one depth, so that bilinear comparisons have to give the same
 /// as single ones, but for the eight bits or so that texture units have for weights.
+#[needs(gpu)]
 #[test]
 fn hardware_comparisons_weigh_as_single_ones_do() {
     let bench = bench();
@@ -312,6 +319,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 }";
 
+#[needs(gpu)]
 #[test]
 fn receivers_and_weights_are_those_of_rust() {
     let bench = bench();

@@ -1,4 +1,4 @@
-//! On a real device, lavapipe where there is no other. Without any these tests fail: `tools/setup` installs one.
+//! On a real device, lavapipe where there is no other.
 
 mod caching;
 mod clamping;

@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use umbrage::visibility::statistic::{Channels, Csm, Esm, Evsm, MAX_CHANNELS, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter};
 use umbrage::{Size, Technique, Warp};
+use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -39,6 +40,7 @@ fn mean(statistic: &Statistic, depths: [f32; 3]) -> Channels {
     mean
 }
 
+#[needs(gpu)]
 #[test]
 fn every_statistic_is_that_of_rust() {
     let bench = bench();
@@ -101,6 +103,7 @@ fn every_statistic_is_that_of_rust() {
 
 /// Maps of one even depth, drawn by the user's own pipeline: whatever is encoded, blurred and interpolated gives a step, in every
 /// texel, at the borders as well, beside maps of another depth.
+#[needs(gpu)]
 #[test]
 fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
     let bench = bench();

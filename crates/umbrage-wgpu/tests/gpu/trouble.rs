@@ -6,6 +6,7 @@ use glam::DVec3;
 use umbrage::visibility::statistic::{Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{Faces, Partition, Size, Technique, Warp};
+use umbrage_testing::needs;
 use umbrage_wgpu::{
     Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
 };
@@ -21,6 +22,7 @@ fn prepare(
     shadows.prepare(&bench.device, &bench.queue, &frame).map(drop)
 }
 
+#[needs(gpu)]
 #[test]
 fn input_that_makes_no_sense_is_named() {
     let bench = bench();
@@ -56,6 +58,7 @@ fn input_that_makes_no_sense_is_named() {
 }
 
 /// A plan for one filter has other casters at its maps' borders, and other depths, than one for another.
+#[needs(gpu)]
 #[test]
 fn a_plan_for_another_filter_is_refused() {
     let bench = bench();
@@ -78,6 +81,7 @@ fn a_plan_for_another_filter_is_refused() {
     prepare(&pcf3).unwrap();
 }
 
+#[needs(gpu)]
 #[test]
 fn filters_that_a_device_cannot_have_are_named() {
     let bench = bench();
@@ -102,6 +106,7 @@ fn vsm() -> Filter {
     Filter::Prefiltered(Prefilter { statistic, blur: Blur::Texels(3), half: false })
 }
 
+#[needs(gpu)]
 #[test]
 fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
     let bench = bench();
@@ -122,6 +127,7 @@ fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
 }
 
 /// On a device that is gone there is nothing to see, but nobody panics.
+#[needs(gpu)]
 #[test]
 fn a_lost_device_does_not_panic() {
     let bench = bench();

@@ -1,0 +1,28 @@
+//! Says what tests are going to be ignored for, and has it looked for anew where that has changed
+//! since they were built. With `UMBRAGE_REQUIRE=all` nothing may be missing.
+
+mod needs;
+
+use std::fs::File;
+use std::process::ExitCode;
+use std::time::SystemTime;
+
+fn main() -> std::io::Result<ExitCode> {
+    let built = [env!("MISSING_SCENES"), env!("MISSING_GPU"), env!("MISSING_BROWSER")];
+    let missing = needs::missing();
+    if missing != built {
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/build.rs");
+        File::options().append(true).open(script)?.set_modified(SystemTime::now())?;
+    }
+    let missing: Vec<_> = missing.iter().filter(|reason| !reason.is_empty()).collect();
+    let is_fatal =
+        !missing.is_empty() && std::env::var("UMBRAGE_REQUIRE").is_ok_and(|v| v == "all");
+    for reason in missing {
+        eprintln!("tests are ignored that have this reason: {reason}");
+    }
+    if is_fatal {
+        eprintln!("nothing may be missing where UMBRAGE_REQUIRE=all");
+        return Ok(ExitCode::FAILURE);
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,62 @@
+//! What some tests need and a machine may lack.
+
+use std::path::{Path, PathBuf};
+
+/// Third-party scenes, a GPU and a browser: why what needs them is ignored, or nothing.
+pub(crate) fn missing() -> [String; 3] {
+    [missing_scenes(), missing_gpu(), missing_browser()].map(Option::unwrap_or_default)
+}
+
+/// The folder of third-party scenes, be it there or not.
+pub(crate) fn scenes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(named_scenes())
+}
+
+/// As named, from the workspace's root.
+fn named_scenes() -> String {
+    set("UMBRAGE_SCENES").unwrap_or("../shared/scenes".into())
+}
+
+fn missing_scenes() -> Option<String> {
+    (!scenes().is_dir()).then(|| {
+        let folder = named_scenes();
+        format!(
+            "needs third-party scenes: there is no folder {folder} (UMBRAGE_SCENES names another)"
+        )
+    })
+}
+
+/// Only Linux can be without any driver for a GPU; there the loader finds drivers by these files.
+fn missing_gpu() -> Option<String> {
+    let folders = ["/etc/vulkan/icd.d", "/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"];
+    let is_driver = |path: &Path| path.extension().is_some_and(|e| e == "json");
+    let has_driver = |folder| {
+        std::fs::read_dir(folder).is_ok_and(|files| files.flatten().any(|f| is_driver(&f.path())))
+    };
+    let told = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(set);
+    let is_here = match told {
+        Some(files) => std::env::split_paths(&files).any(|f| f.is_file()),
+        None => folders.into_iter().any(has_driver),
+    };
+    (cfg!(target_os = "linux") && !is_here).then(|| {
+        "needs a GPU: there is no Vulkan driver, not even one in software (tools/setup installs it)"
+            .to_owned()
+    })
+}
+
+fn missing_browser() -> Option<String> {
+    let told = set("CHROMIUM");
+    let names = told
+        .as_deref()
+        .map_or(vec!["chromium", "chromium-browser", "google-chrome"], |name| vec![name]);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let is_here = |name: &&str| folders.iter().any(|folder| folder.join(name).is_file());
+    (!names.iter().any(is_here)).then(|| {
+        format!("needs a browser: there is no {} (tools/setup installs Chromium)", names.join(", "))
+    })
+}
+
+fn set(variable: &str) -> Option<String> {
+    std::env::var(variable).ok().filter(|value| !value.is_empty())
+}
