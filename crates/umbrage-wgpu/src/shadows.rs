@@ -320,6 +320,24 @@ impl Shadows {
         wgsl::lookup(group, &self.options, self.support.storage_buffers)
     }
 
+    /// As [`lookup_wgsl`](Self::lookup_wgsl), for shaders that look several [`Shadows`] up, say with a
+    /// filter for the sun and another for lamps: `name` and an underscore stand before all names, as
+    /// in `sun_shadow_visibility`, `SunShadowMap` and `SUN_SHADOW_NONE`.
+    ///
+    /// # Errors
+    /// A name other than lower-case letters, digits and underscores behind a letter.
+    pub fn lookup_wgsl_named(&self, group: u32, name: &str) -> Result<String, Error> {
+        let is_letter = |c: char| c.is_ascii_lowercase();
+        let is_good = |c: char| is_letter(c) || c.is_ascii_digit() || c == '_';
+        if !name.starts_with(is_letter) || !name.chars().all(is_good) {
+            return Err(Error::Invalid {
+                field: "name",
+                problem: format!("must be lower-case letters and digits, as in sun, is {name:?}"),
+            });
+        }
+        Ok(wgsl::named(&self.lookup_wgsl(group), name))
+    }
+
     /// Layout of the bind group that [`lookup_wgsl`](Self::lookup_wgsl) takes, for fragment shaders and, on devices with
     /// storage buffers, compute shaders.
     pub fn lookup_layout(&self) -> &BindGroupLayout {

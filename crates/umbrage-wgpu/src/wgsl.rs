@@ -90,6 +90,30 @@ pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool)
     lookup_shader(group, options, storage_buffers).link()
 }
 
+/// A shader's text with `name` put before the names in it, all of which begin with `shadow`, `Shadow`
+/// or `SHADOW`: `shadow_normal` becomes `sun_shadow_normal`, `ShadowMap` becomes `SunShadowMap`.
+pub(crate) fn named(text: &str, name: &str) -> String {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let capital = name.chars().take(1).map(|c| c.to_ascii_uppercase());
+    let capitalised: String = capital.chain(name.chars().skip(1)).collect();
+    let prefixes = [
+        ("shadow_", format!("{name}_")),
+        ("Shadow", capitalised),
+        ("SHADOW_", format!("{}_", name.to_ascii_uppercase())),
+    ];
+    let mut renamed = String::with_capacity(text.len() * 11 / 10);
+    let mut is_inside_word = false;
+    for (i, c) in text.char_indices() {
+        if !is_inside_word {
+            let prefix = prefixes.iter().find(|(begin, _)| text[i..].starts_with(begin));
+            renamed.extend(prefix.map(|(_, prefix)| prefix.as_str()));
+        }
+        renamed.push(c);
+        is_inside_word = is_word(c);
+    }
+    renamed
+}
+
 fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> Shader {
     let ShadowOptions { filter, comparison, layout } = *options;
     let mut shader = Shader::new(module!("lookup"));
@@ -100,6 +124,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
         module!("receiver"),
     ]);
     add_width(&mut shader, &filter);
+    add_reach(&mut shader, &filter);
     let depths = match layout {
         Layout::Atlas => module!("texture/atlas"),
         Layout::Layers => module!("texture/layers"),
@@ -167,6 +192,21 @@ fn add_width(shader: &mut Shader, filter: &Filter) {
         Some(Width::Metres(_)) => module!("width/metres"),
         Some(Width::Pixels(_)) => module!("width/pixels"),
     }]);
+}
+
+/// How far from a receiver the filter reads texels, as far as lookups with smooth normals allow for
+/// it: to the middle of the farthest texel.
+fn add_reach(shader: &mut Shader, filter: &Filter) {
+    const HALF_DIAGONAL: f32 = 0.707_106_8;
+    let [texels, widths] = match filter {
+        Filter::Hard => [HALF_DIAGONAL, 0.0],
+        Filter::Pcf { n } => [HALF_DIAGONAL * ((*n).clamp(1, Filter::MAX_PCF) + 1) as f32, 0.0],
+        Filter::Spread { .. } => [HALF_DIAGONAL, HALF_DIAGONAL],
+        // Their widths follow from what they find.
+        Filter::Pcss { .. } | Filter::Prefiltered(_) => [4.0, 0.0],
+    };
+    shader.constant("SHADOW_REACH", texels);
+    shader.constant("SHADOW_REACH_IN_WIDTHS", widths);
 }
 
 /// Comparisons over a square or a disc, n² of them.

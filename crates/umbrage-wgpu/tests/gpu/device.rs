@@ -120,7 +120,7 @@ impl Bench {
         self.read(&readback)
     }
 
-    fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
+    pub(crate) fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
         buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         bytemuck::pod_collect_to_vec(&buffer.get_mapped_range(..).unwrap())

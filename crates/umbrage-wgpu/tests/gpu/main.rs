@@ -2,6 +2,7 @@
 
 mod caching;
 mod clamping;
+mod cookbook;
 mod device;
 mod kernels;
 mod statistics;

@@ -1,0 +1,259 @@
+//! The cookbook's recipes, run in a scene whose shadows are known: boxes on a plain.
+#![expect(unreachable_pub, reason = "recipes are written as a module of a user's own")]
+
+#[path = "../../cookbook/custom_casters.rs"]
+mod custom_casters;
+#[path = "../../cookbook/deferred.rs"]
+mod deferred;
+#[path = "../../cookbook/filter_at_run_time.rs"]
+mod filter_at_run_time;
+#[path = "../../cookbook/filters_per_light.rs"]
+mod filters_per_light;
+mod kitchen;
+#[path = "../../cookbook/resizing.rs"]
+mod resizing;
+#[path = "../../cookbook/show_a_map.rs"]
+mod show_a_map;
+#[path = "../../cookbook/smooth_normals.rs"]
+mod smooth_normals;
+#[path = "../../cookbook/two_cameras.rs"]
+mod two_cameras;
+
+use crate::device::Bench;
+use bytemuck::cast_slice;
+use filter_at_run_time::change_technique;
+use glam::{DVec2, DVec3, Mat4, Vec3, camera::rh};
+use kitchen::{FORMAT, Kitchen, SIZE, box_at, camera, plain};
+use two_cameras::ViewShadows;
+use umbrage::{Bounds, Camera, Light, PointLight, Technique};
+use umbrage_testing::needs;
+use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Timestamps};
+use wgpu::BufferUsages;
+
+const SUN: Light = Light::Directional { direction: DVec3::new(0.5, -1.0, 0.25) };
+
+fn technique(text: &str) -> Technique {
+    text.parse().unwrap()
+}
+
+fn shadows(bench: &Bench, technique: &Technique) -> Shadows {
+    let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+    Shadows::new(&bench.device, bench.support, &options).unwrap()
+}
+
+/// A box that a joint lifts aside casts where the joint puts it, not where its mesh lies.
+#[needs(gpu)]
+#[test]
+fn skinned_casters_cast_where_they_are_posed() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let technique = technique("adaptive:pcf2@1024");
+    let mut shadows = shadows(bench, &technique);
+    let moved = DVec3::new(2.5, 0.5, -1.0);
+    let joints = [Mat4::IDENTITY, Mat4::from_translation(moved.as_vec3())];
+    let (layout, group) = kitchen.uniform(cast_slice(&joints));
+    let pipeline = custom_casters::skinned_casters(&bench.device, &shadows, &layout);
+    // The plain has joint 0, the box joint 1.
+    let vertices: Vec<(Vec3, u32)> = [(plain(), 0), (box_at(DVec3::ZERO), 1)]
+        .into_iter()
+        .flat_map(|(mesh, joint)| mesh.into_iter().map(move |position| (position, joint)))
+        .collect();
+    let bytes: Vec<u8> = vertices
+        .iter()
+        .flat_map(|(p, joint)| [cast_slice(&p.to_array()), &joint.to_le_bytes()].concat())
+        .collect();
+    let buffer = bench.buffer(&bytes, BufferUsages::VERTEX);
+    let plan = kitchen.plan(&[SUN], &technique);
+    let mut encoder = bench.encoder();
+    let frame = Frame { plan: &plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
+    shadows.prepare(&bench.device, &bench.queue, &frame).unwrap().encode(
+        &mut encoder,
+        &Timestamps::default(),
+        |map| {
+            map.pass.set_pipeline(&pipeline);
+            map.pass.set_bind_group(1, &group, &[]);
+            map.pass.set_vertex_buffer(0, buffer.slice(..));
+            map.pass.draw(0..vertices.len() as u32, 0..1);
+        },
+    );
+    bench.finish(encoder);
+    let picture = kitchen.forward(&shadows, &kitchen::shader("shadow_visibility"), &camera());
+    kitchen.check(&picture, &camera(), |p| kitchen::box_hides(moved, p, -sun_direction()));
+}
+
+fn sun_direction() -> DVec3 {
+    let Light::Directional { direction } = SUN else { unreachable!("the sun") };
+    direction
+}
+
+#[needs(gpu)]
+#[test]
+fn deferred_shading_gives_the_same_shadows() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let technique = technique("adaptive+z2:pcf3@1024");
+    let mut shadows = shadows(bench, &technique);
+    kitchen.draw_maps(&mut shadows, &kitchen.plan(&[SUN], &technique));
+    let layout = deferred::gbuffer_layout(&bench.device);
+    let pipeline = deferred::deferred_shading(&bench.device, &shadows, &layout, FORMAT);
+    let picture = kitchen.deferred(&shadows, &layout, &pipeline, &camera());
+    kitchen.check(&picture, &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+}
+
+/// A dome of flat triangles with the smooth normals of a sphere: with these its own facets shadow it.
+/// The triangles' own normals cure that, and so does a lookup that allows for the difference; neither
+/// lights what the box shadows.
+#[needs(gpu)]
+#[test]
+fn smooth_normals_are_cured() {
+    let kitchen = Kitchen::new(&[plain(), kitchen::dome(), box_at(DVec3::new(-3.0, 0.0, 1.0))]);
+    let technique = technique("adaptive:pcf3@2048");
+    let mut shadows = shadows(&kitchen.bench, &technique);
+    kitchen.draw_maps(&mut shadows, &kitchen.plan(&[SUN], &technique));
+    let dark = |expression: &str| {
+        let shader = kitchen::dome_shader(smooth_normals::SMOOTH_LOOKUP, expression);
+        let picture = kitchen.forward(&shadows, &shader, &camera());
+        kitchen.check(&picture, &camera(), |p| {
+            kitchen::box_hides(DVec3::new(-3.0, 0.0, 1.0), p, -sun_direction())
+                || kitchen::dome_hides(p, -sun_direction())
+        });
+        kitchen::dark_on_dome(&picture, &camera(), -sun_direction())
+    };
+    let smooth = dark("shadow_visibility(0u, position, smooth_normal)");
+    let own = dark("shadow_visibility(0u, position, shadow_normal(position))");
+    let tolerant = dark("light_on_smooth_surface(0u, position, smooth_normal)");
+    assert!(smooth > 0.01, "smooth normals darken {smooth} of the dome");
+    assert!(own < 0.002 && tolerant < 0.002, "own {own}, tolerant {tolerant}");
+}
+
+#[needs(gpu)]
+#[test]
+fn two_cameras_have_shadows_of_their_own() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let other = kitchen::camera_from(DVec3::new(-6.0, 3.0, 7.0));
+    let technique = technique("adaptive:pcf2@1024");
+    let bounds = kitchen.bounds();
+    let views = [camera(), other].map(|camera| {
+        let mut view = ViewShadows::new(&bench.device, bench.support, technique).unwrap();
+        let mut encoder = bench.encoder();
+        let casters = kitchen.casters(&view.shadows);
+        view.draw((&bench.device, &bench.queue), &mut encoder, (&camera, &[SUN], &bounds), |map| {
+            kitchen.draw(casters.pipeline(), map)
+        })
+        .unwrap();
+        bench.finish(encoder);
+        (camera, view)
+    });
+    // One pipeline looks the maps of either up.
+    let shader = kitchen::shader("shadow_visibility");
+    let pipeline = kitchen.pipeline(&views[0].1.shadows, &shader);
+    for (camera, view) in &views {
+        let picture = kitchen.shade(&view.shadows, &pipeline, camera);
+        kitchen.check(&picture, camera, |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+    }
+}
+
+#[needs(gpu)]
+#[test]
+fn filters_change_at_run_time() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let device = &kitchen.bench.device;
+    let shader = kitchen::shader("shadow_visibility");
+    let first = technique("adaptive@1024");
+    let mut shadows = shadows(&kitchen.bench, &first);
+    let mut pipeline = kitchen.pipeline(&shadows, &shader);
+    for (text, changes) in [
+        ("adaptive+z2@1024", false),
+        ("uniform:pcf5@1024", true),
+        ("lispsm:vsm(blur=3)@1024", true),
+    ] {
+        let technique = technique(text);
+        let make = |shadows: &Shadows| kitchen.pipeline(shadows, &shader);
+        let made = change_technique(device, &mut shadows, &technique, make).unwrap();
+        assert_eq!(made.is_some(), changes, "{text}");
+        pipeline = made.unwrap_or(pipeline);
+        kitchen.draw_maps(&mut shadows, &kitchen.plan(&[SUN], &technique));
+        let picture = kitchen.shade(&shadows, &pipeline, &camera());
+        kitchen
+            .check(&picture, &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+    }
+}
+
+/// Each slice has a tint of its own, and the overlay shows depths: not all of them 1.
+#[needs(gpu)]
+#[test]
+fn maps_are_shown() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let technique = technique("uniform+z3@512");
+    let mut shadows = shadows(bench, &technique);
+    let plan = kitchen.plan(&[SUN], &technique);
+    kitchen.draw_maps(&mut shadows, &plan);
+    let tinted = format!(
+        "{}{}",
+        include_str!("../../cookbook/show_a_map.wgsl"),
+        kitchen::shader_of_color("vec4f(map_tint(0u, position), 1.0)")
+    );
+    let picture = kitchen.forward(&shadows, &tinted, &camera());
+    let mut tints: Vec<Vec<[u8; 4]>> = vec![Vec::new(); plan.maps.len()];
+    for (pixel, p) in kitchen::ground_pixels(&camera()) {
+        let color = picture[(pixel.y as u32 * SIZE[0] + pixel.x as u32) as usize];
+        if let Some((map, _)) = plan.lookup(0, p).next() {
+            tints[map].push(color);
+        }
+    }
+    let seen: Vec<_> = tints.iter().filter(|t| t.len() > 200).collect();
+    assert!(seen.len() >= 2, "several slices are seen");
+    let brightest = |tints: &&Vec<[u8; 4]>| *tints.iter().max().unwrap();
+    let all: std::collections::BTreeSet<_> = seen.iter().map(brightest).collect();
+    assert_eq!(all.len(), seen.len(), "{all:?}");
+    let overlay = show_a_map::map_overlay(&bench.device, &shadows, FORMAT);
+    let picture = kitchen.overlay(&shadows, &overlay);
+    let shown = |&[r, g, b, _]: &[u8; 4]| r == g && g == b;
+    let corner = |x: u32, y: u32| picture[(y * SIZE[0] + x) as usize];
+    let in_corner: Vec<_> = (SIZE[1] / 2..SIZE[1])
+        .flat_map(|y| (0..SIZE[0] / 2).map(move |x| (x, y)))
+        .map(|(x, y)| corner(x, y))
+        .collect();
+    assert!(in_corner.iter().all(shown) && in_corner.iter().any(|c| c[0] < 200));
+    assert_eq!(corner(SIZE[0] - 1, 0), [0, 0, 255, 255], "the rest of the picture is left alone");
+}
+
+#[needs(gpu)]
+#[test]
+fn lights_have_filters_of_their_own() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let position = DVec3::new(-3.0, 4.0, 2.0);
+    let lamp = Light::Point(PointLight { position, near: 0.1, range: 40.0 });
+    let [sharp, soft] = ["adaptive@1024", "uniform:pcf5@1024"].map(technique);
+    let mut sun_shadows = shadows(bench, &sharp);
+    let mut lamp_shadows = shadows(bench, &soft);
+    kitchen.draw_maps(&mut sun_shadows, &kitchen.plan(&[SUN], &sharp));
+    kitchen.draw_maps(&mut lamp_shadows, &kitchen.plan(&[lamp], &soft));
+    let text = filters_per_light::two_filters(&sun_shadows, &lamp_shadows).unwrap();
+    let picture = kitchen.with_two(&text, [&sun_shadows, &lamp_shadows], &camera());
+    let channel = |c: usize| picture.iter().map(|p| [p[c], 0, 0, 255]).collect::<Vec<_>>();
+    kitchen.check(&channel(0), &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+    kitchen.check(&channel(1), &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, position - p));
+}
+
+#[test]
+fn a_resized_picture_has_its_own_errors() {
+    let world_from_view = rh::view::look_at_mat4(Vec3::new(5.0, 4.0, 9.0), Vec3::ZERO, Vec3::Y);
+    let world_from_view = world_from_view.as_dmat4().inverse();
+    let projection = |aspect: f32| rh::proj::directx::perspective(0.9, aspect, 0.1, 60.0);
+    let sized = |size| resizing::resized(world_from_view, projection, size);
+    assert!(sized([0, 720]).is_none());
+    let [small, large] = [[640, 360], [1280, 720]].map(|size| sized(size).unwrap().unwrap());
+    let mut planner = umbrage::Planner::new();
+    let technique = technique("adaptive@4px");
+    let mut texels = |camera: &Camera| {
+        planner.plan(camera, &[SUN], &Bounds::default(), &technique).unwrap().texels() as f64
+    };
+    // Twice as many pixels each way ask for twice as many texels each way.
+    let ratio = texels(&large) / texels(&small);
+    assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
+    assert_eq!(large.pixel(DVec3::ZERO).map(DVec2::round), Some(DVec2::new(640.0, 360.0)));
+}
