@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Plan, Warp};
-use umbrage_render::{Drawn, FrameTarget, Gpu, Look, Renderer, SceneBuffers, Timer};
+use umbrage_render::{Drawn, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer, View};
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -146,9 +146,9 @@ impl OnGpu<'_> {
     /// What rows of a picture look like; where texels lie only if that is wanted.
     fn strip(&mut self, rows: &Rows<'_>, wants_texels: bool) -> Result<Strip> {
         let (camera, grid) = (rows.view.camera(), rows.view.grid());
-        let look = Look { camera, light: rows.view.light(), light_index: 0 };
-        let samples = self.renderer.samples(&look, rows.range.clone(), grid, wants_texels)?;
-        Ok(Strip::of_gpu(&samples, grid, camera))
+        let shading = Shading { camera, light: rows.view.light(), light_index: 0 };
+        let samples = self.renderer.samples(&shading, rows.range.clone(), grid, wants_texels)?;
+        Ok(Strip::of_gpu(&samples, rows.view))
     }
 }
 
@@ -280,20 +280,21 @@ impl Bencher<'_> {
             (Executor::Gpu(on), Some((target, timer))) => {
                 let OnGpu { renderer, gpu, .. } = &mut **on;
                 let casters = if still { Casters::Unmoved } else { Casters::Moved };
-                let look = Look { camera: view.camera(), light: view.light(), light_index: 0 };
+                let shading =
+                    Shading { camera: view.camera(), light: view.light(), light_index: 0 };
                 let drawn = renderer.draw_maps(plan, casters, timer.as_ref())?;
                 let [depth, filter, shade] = match timer {
                     Some(timer) => {
-                        renderer.frame(&look, target, Some(timer))?;
+                        renderer.frame(&shading, target, Some(timer))?;
                         timer.read(gpu)?
                     }
                     None => {
                         gpu.wait()?;
                         let depth = milliseconds(start);
-                        let shading = Instant::now();
-                        renderer.frame(&look, target, None)?;
+                        let shaded = Instant::now();
+                        renderer.frame(&shading, target, None)?;
                         gpu.wait()?;
-                        [depth, 0.0, milliseconds(shading)]
+                        [depth, 0.0, milliseconds(shaded)]
                     }
                 };
                 let is_still = drawn.is_empty();

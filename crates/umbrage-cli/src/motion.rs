@@ -218,9 +218,8 @@ fn ideal(
     rows: Range<u32>,
     progress: umbrage_trace::Progress<'_>,
 ) -> Vec<Ideal> {
-    let counts = |s: &Option<Sample>| {
-        s.as_ref().filter(|s| s.is_facing && s.depth <= view.camera().far()).copied()
-    };
+    let counts =
+        |s: &Option<Sample>| s.as_ref().filter(|s| view.counts(s.is_facing, s.depth)).copied();
     let first = rows.start as usize * view.camera().image()[0] as usize;
     let band = view.band(rows.clone(), progress);
     let truth = band.map(|s| view.truth(s), &|_| {});
@@ -284,8 +283,8 @@ impl Trail {
 /// A sample as it is and as it was in the frame before, if it counts in both and the truth about it has
 /// not changed.
 fn steady(sample: &Sample, view: &View<'_>, last: &View<'_>) -> Option<[Sample; 2]> {
-    let counts = |s: &Sample, view: &View<'_>| s.is_facing && s.depth <= view.camera().far();
     let was = last.sees(&sample.surface)?;
-    let both_count = counts(sample, view) && counts(&was, last);
+    let both_count =
+        view.counts(sample.is_facing, sample.depth) && last.counts(was.is_facing, was.depth);
     (both_count && view.truth(sample) == last.truth(&was)).then_some([*sample, was])
 }

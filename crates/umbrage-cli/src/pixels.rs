@@ -104,11 +104,11 @@ impl Lookup {
 impl Strip {
     fn new(view: &View<'_>, band: &Band, visibility: Vec<f32>) -> Self {
         let samples = || band.samples().iter().map(Option::as_ref);
-        let far = view.camera().far();
+        let counts = |s: &Sample| view.counts(s.is_facing, s.depth);
         Self {
             samples_per_pixel: band.samples_per_pixel(),
             radiance: shade::radiances(view, band, &visibility),
-            counts: samples().map(|s| s.is_some_and(|s| s.is_facing && s.depth <= far)).collect(),
+            counts: samples().map(|s| s.is_some_and(counts)).collect(),
             depth: samples().map(|s| s.map_or(f32::INFINITY, |s| s.depth as f32)).collect(),
             normal: samples()
                 .map(|s| s.map_or(Vec3::ZERO, |s| s.surface.shading_normal.as_vec3()))
@@ -119,16 +119,16 @@ impl Strip {
     }
 
     /// What a GPU drew.
-    pub(crate) fn of_gpu(samples: &[umbrage_render::Sample], grid: u32, camera: &Camera) -> Self {
+    pub(crate) fn of_gpu(samples: &[umbrage_render::Sample], view: &View<'_>) -> Self {
         type Drawn = umbrage_render::Sample;
-        let counts = |s: &Drawn| s.is_facing && f64::from(s.depth) <= camera.far();
+        let counts = |s: &Drawn| view.counts(s.is_facing, s.depth.into());
         let lookup = |s: &Drawn| Lookup {
             error: s.error,
             texel: s.texel.to_array(),
             map: s.map.and_then(|m| u16::try_from(m).ok()),
         };
         Self {
-            samples_per_pixel: (grid * grid) as usize,
+            samples_per_pixel: view.grid().pow(2) as usize,
             radiance: samples.iter().map(|s| s.radiance).collect(),
             visibility: samples.iter().map(|s| s.visibility).collect(),
             counts: samples.iter().map(counts).collect(),

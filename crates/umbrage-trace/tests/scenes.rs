@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::path::PathBuf;
 use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique};
 use umbrage_scene::Scene;
-use umbrage_trace::{Ray, Reference, Tracer, View};
+use umbrage_trace::{Ray, Reference, Sample, Tracer, View};
 
 fn load(name: &str) -> Scene {
     let folder = std::env::var_os("UMBRAGE_SCENES").map_or_else(
@@ -65,15 +65,15 @@ fn a_real_level_comes_out_right() {
     let light = Light::Directional { direction: DVec3::new(-0.57923, -0.707, -0.40558) };
     let view = View::new(&tracer, camera, light, 1).unwrap();
     let band = view.band(0..270, &nobody);
-    let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());
+    let counts = |s: &Sample| view.counts(s.is_facing, s.depth);
+    let truth = band.map(|s| counts(s).then(|| view.truth(s)), &nobody);
     let bounds = Bounds::of_scene(tracer.bounds());
     let mut planner = Planner::new();
     for text in ["adaptive@2048", "adaptive:pcf2@2048"] {
         let technique: Technique = text.parse().unwrap();
         let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
         let reference = Reference::render(&tracer, plan, &nobody).unwrap();
-        let lit = band.map(|s| reference.visibility(0, s), &nobody);
-        let lit = band.means_facing(&lit, camera.far());
+        let lit = band.map(|s| counts(s).then(|| reference.visibility(0, s)), &nobody);
         let pairs = truth.iter().zip(&lit).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
         let (wrong, all) = pairs.fold((0, 0), |(wrong, all), (truth, lit)| {
             (wrong + usize::from((truth - lit).abs() > 0.5), all + 1)

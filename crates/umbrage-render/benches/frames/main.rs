@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Bounds, Camera, Light, Plan, Planner, Technique};
-use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading};
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -64,8 +64,8 @@ impl<'a> Set<'a> {
         target: &FrameTarget,
     ) -> Result<(), Failure> {
         renderer.draw_maps(plan, Casters::Moved, None)?;
-        let look = Look { camera: &self.camera, light: &self.light, light_index: 0 };
-        renderer.frame(&look, target, None)?;
+        let shading = Shading { camera: &self.camera, light: &self.light, light_index: 0 };
+        renderer.frame(&shading, target, None)?;
         Ok(self.gpu.wait()?)
     }
 }
