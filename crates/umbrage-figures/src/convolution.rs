@@ -1,6 +1,7 @@
 //! Convolution shadow maps' figures: the Fourier step and its trade-offs, and what it makes of shadows.
 
-use crate::chart::{self, Axis, Curve, LineChart};
+use crate::axis::Axis;
+use crate::chart::{self, Curve, LineChart};
 use crate::figure::{Figure, File};
 use crate::rendered::{Shot, sheet};
 use crate::table::{Cell, Table};

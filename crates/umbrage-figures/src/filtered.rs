@@ -13,10 +13,10 @@ fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
     let scene = umbrage_scene::builtin("grove", Some(2))?;
     let tracer = Tracer::new(&scene)?;
     let light = Light::Directional { direction: DVec3::new(0.8, -0.55, 0.5) };
-    let shot = Shot::new(&scene, &tracer, light, |look| {
-        look.eye = DVec3::new(9.0, 5.0, 13.0);
-        look.target = DVec3::new(4.9, 0.5, 0.6);
-        look.fov_y_rad = 0.22;
+    let shot = Shot::new(&scene, &tracer, light, |view| {
+        view.eye = DVec3::new(9.0, 5.0, 13.0);
+        view.target = DVec3::new(4.9, 0.5, 0.6);
+        view.fov_y_rad = 0.22;
     })?;
     let picture = |(label, spec): &(String, String)| Ok((label.clone(), shot.picture(spec)?));
     techniques.iter().map(picture).collect()

@@ -10,17 +10,21 @@
 //! ```
 
 mod aliasing;
+mod axis;
 mod chart;
 mod contour;
 mod convolution;
 mod figure;
 mod filtered;
+mod heat;
+mod hemisphere;
 mod lispsm;
 mod measured;
 mod misprints;
 mod ours;
 mod planned;
 mod rendered;
+mod schemes;
 mod table;
 mod warping;
 
@@ -40,7 +44,7 @@ const FIGURES: &[(&str, Make)] = &[
     ("lispsm-fig6", lispsm::fig6),
     ("wp-fig5", warping::fig5),
     ("wp-fig6", warping::fig6),
-    ("wp-fig7", warping::fig7),
+    ("wp-fig7", hemisphere::fig7),
     ("wp-fig10", warping::fig10),
     ("wp-fig12", warping::fig12),
     ("wp-fig13", warping::fig13),

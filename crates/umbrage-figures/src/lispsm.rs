@@ -1,6 +1,7 @@
 //! The figure of Wimmer, Scherzer and Purgathofer 2004.
 
-use crate::chart::{Axis, Curve, LineChart};
+use crate::axis::Axis;
+use crate::chart::{Curve, LineChart};
 use crate::figure::{Figure, File};
 use crate::measured::{error_at, from_behind, plan};
 use crate::table::{Cell, Table};

@@ -1,8 +1,10 @@
 //! What the papers left open: the worst errors of every warp at any angle of light, and what choosing the warp by
 //! them gains.
 
-use crate::chart::{Axis, Curve, HeatMaps, LineChart, Panel};
+use crate::axis::Axis;
+use crate::chart::{Curve, LineChart};
 use crate::figure::{Figure, File};
+use crate::heat::{HeatMaps, Panel};
 use crate::planned::{self, Planned};
 use crate::table::{Cell, Table};
 use anyhow::Result;

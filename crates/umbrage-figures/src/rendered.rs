@@ -25,15 +25,15 @@ pub(crate) struct Shot<'a> {
 }
 
 impl<'a> Shot<'a> {
-    /// `look` changes the scene's own view.
+    /// `change` makes it from the scene's own view.
     pub(crate) fn new(
         scene: &Scene,
         tracer: &'a Tracer<'a>,
         light: Light,
-        look: impl FnOnce(&mut LookAt),
+        change: impl FnOnce(&mut LookAt),
     ) -> Result<Self> {
         let mut view = scene.default_view().look_at(TILE);
-        look(&mut view);
+        change(&mut view);
         let camera = Camera::look_at(view)?;
         Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })
     }
