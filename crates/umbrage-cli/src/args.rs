@@ -110,18 +110,6 @@ pub(crate) struct Figures {
     pub(crate) only: Vec<String>,
 }
 
-/// Which scene.
-#[derive(Debug, Args)]
-pub(crate) struct SceneArgs {
-    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them), with a size if you
-    /// like: town:200.
-    #[arg(value_name = "SCENE")]
-    pub(crate) name: String,
-    /// Alpha-masked materials cast and show as solid.
-    #[arg(long)]
-    pub(crate) opaque: bool,
-}
-
 /// What is done if no command is given.
 const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
 

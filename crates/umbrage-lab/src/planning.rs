@@ -1,12 +1,9 @@
 //! Plans, and how long planning takes.
 
 use crate::error::Error;
-use crate::technique::NamedTechnique;
+use crate::technique::{MAX_SIDE, NamedTechnique};
 use std::time::Instant;
 use umbrage::{Bounds, Camera, Light, Limits, Plan, Planner};
-
-/// The longest side of a shadow map, texels; what today's GPUs allow.
-pub const MAX_SIDE: u32 = 16384;
 
 /// A planner for whatever a technique may ask for.
 pub fn planner() -> Planner {

@@ -13,14 +13,11 @@ use crate::progress::Progress;
 use crate::receivers::Fit;
 use crate::scene::{digest, open_scene};
 use crate::strip::NOTHING_TO_SHADOW;
-use folder::{Inputs, SweepFolder};
+use folder::{Inputs, SweepFolder, VERSION};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use umbrage_measure::{Sweep, SweepPage, SweepSettings, SweptView, write_sweep};
 use views::SweepView;
-
-/// Figures of another version are no figures of this one.
-const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What to compare in which views.
 #[derive(Clone, Debug)]

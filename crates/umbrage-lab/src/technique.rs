@@ -1,11 +1,13 @@
 //! Techniques as people write them.
 
 use crate::error::{Error, Field};
-use crate::planning::MAX_SIDE;
 use std::fmt::{self, Display};
 use std::str::FromStr;
 use umbrage::language::ParseError;
 use umbrage::{Error as PlanError, Size, Technique};
+
+/// The longest side of a shadow map, texels; what today's GPUs allow.
+pub(crate) const MAX_SIDE: u32 = 16384;
 
 /// A technique, and the text that asked for it. Reports show the text, so that results are found by
 /// what was asked for.

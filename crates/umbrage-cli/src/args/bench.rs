@@ -1,8 +1,7 @@
 //! `umbrage bench` and `umbrage devices`: what may be asked for.
 
-use super::SceneArgs;
 use super::technique::TechniqueArgs;
-use super::view::{LightArgs, ViewArgs};
+use super::view::{LightArgs, SceneArgs, ViewArgs};
 use anyhow::Result;
 use clap::Args;
 

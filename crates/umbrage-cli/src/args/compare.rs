@@ -1,8 +1,7 @@
 //! `umbrage compare` and `umbrage sweep`: their options.
 
-use super::SceneArgs;
 use super::technique::ComparisonArgs;
-use super::view::{DEFAULT_SIZE, LightArgs, ViewArgs};
+use super::view::{DEFAULT_SIZE, LightArgs, SceneArgs, ViewArgs};
 use crate::values;
 use anyhow::Result;
 use clap::{Args, ValueEnum};

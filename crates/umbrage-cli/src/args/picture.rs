@@ -1,8 +1,7 @@
 //! `umbrage render`: its options.
 
-use super::SceneArgs;
 use super::technique::{ExecutionArgs, Fit, TexelArgs};
-use super::view::{LightArgs, ViewArgs};
+use super::view::{LightArgs, SceneArgs, ViewArgs};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;

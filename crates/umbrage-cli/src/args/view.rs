@@ -1,4 +1,4 @@
-//! Who looks on, in which light: options that many commands share.
+//! Scene, view and light: options that many commands share.
 
 use crate::values;
 use anyhow::{Result, ensure};
@@ -9,7 +9,19 @@ use umbrage_lab::{LightOptions, ViewOptions};
 /// Size of pictures where none is given.
 pub(super) const DEFAULT_SIZE: &str = "960x540";
 
-/// Who looks on. What is left out comes from the scene.
+/// Which scene.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them), with a size if you
+    /// like: town:200.
+    #[arg(value_name = "SCENE")]
+    pub(crate) name: String,
+    /// Alpha-masked materials cast and show as solid.
+    #[arg(long)]
+    pub(crate) opaque: bool,
+}
+
+/// The view. What is left out comes from the scene.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "View")]
 pub(crate) struct ViewArgs {

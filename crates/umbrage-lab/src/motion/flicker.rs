@@ -1,6 +1,6 @@
 //! Shadows that change from frame to frame where the truth does not.
 
-use super::{Frame, Motion, MovingView, executors};
+use super::frames::{Frame, Motion, MovingView, executors};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::technique::NamedTechnique;

@@ -1,6 +1,6 @@
 //! Pixels that sparkle as a scene gets smaller.
 
-use super::{Frame, Motion, MovingView, executors};
+use super::frames::{Frame, Motion, MovingView, executors};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::technique::NamedTechnique;

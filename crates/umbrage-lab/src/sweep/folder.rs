@@ -19,6 +19,9 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use umbrage_measure::{Report, SweepSettings, write_file};
 
+/// Figures of another version are no figures of this one.
+pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 const SETTINGS: &str = "sweep.json";
 const LOCK: &str = ".lock";
 const VIEWS: &str = "views";

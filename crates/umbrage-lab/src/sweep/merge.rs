@@ -1,6 +1,6 @@
 //! Shares of a sweep, joined.
 
-use super::folder::{self, Stored, check_same, stored};
+use super::folder::{self, Stored, VERSION, check_same, stored};
 use super::views::SweepView;
 use crate::error::{About, Error, Field};
 use std::collections::HashMap;
@@ -133,8 +133,8 @@ impl<'a> Search<'a> {
 /// Why a result is not one of this sweep.
 fn unfit(stored: &Stored, view: &SweepView, settings: &SweepSettings) -> Option<String> {
     let inputs = &stored.inputs;
-    if inputs.version != super::VERSION {
-        Some(format!("was made by umbrage {}, not {}", inputs.version, super::VERSION))
+    if inputs.version != VERSION {
+        Some(format!("was made by umbrage {}, not {}", inputs.version, VERSION))
     } else if inputs.view != *view {
         Some("is another view of that name".to_owned())
     } else if inputs.settings != *settings {
