@@ -74,8 +74,8 @@
     return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
   }
 
-  // A mouse drags from where it presses; a finger only once it has moved sideways, so that a tap can
-  // place the magnifier and a vertical stroke scrolls the page.
+  // A mouse drags the divider from the point where it is pressed. A finger only drags after it has moved
+  // sideways, so that a tap can place the magnifier and a vertical stroke can scroll the page.
   let press = null;
   stage.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
@@ -149,7 +149,7 @@
     context.clearRect(0, 0, ...size);
     if (!image.complete || !image.naturalWidth) return;
     context.imageSmoothingEnabled = false;
-    // Pixels stay square, whatever the region had to be clamped to.
+    // Pixels stay square even if the region was clamped at the edge of the picture.
     const scale = Math.min(size[0] / w, size[1] / h);
     context.drawImage(image, left, top, w, h, (size[0] - w * scale) / 2, (size[1] - h * scale) / 2, w * scale, h * scale);
   }

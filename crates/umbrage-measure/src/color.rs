@@ -1,14 +1,14 @@
-//! Colours that mean something, the same in every picture and in the report's legends.
+//! Colours with a meaning, the same in every picture and in the legends of the reports.
 
 use crate::{Error, Rgb};
 use std::sync::LazyLock;
 
-/// Lit and should be dark. With [`FALSE_SHADOW`] a pair that all common kinds of colour vision tell
-/// apart.
+/// The colour of pixels that are lit and should be dark. People with any common kind of colour
+/// vision can tell it from [`FALSE_SHADOW`].
 pub const FALSE_LIGHT: Rgb = [255, 176, 0];
-/// Dark and should be lit.
+/// The colour of pixels that are dark and should be lit.
 pub const FALSE_SHADOW: Rgb = [56, 140, 255];
-/// A map of the plan each, repeating: Okabe and Ito's palette without its black and grey.
+/// The colours of a plan's maps; they repeat. Okabe and Ito's palette without its black and grey.
 pub const PARTITIONS: [Rgb; 7] = [
     [86, 180, 233],
     [230, 159, 0],
@@ -19,58 +19,58 @@ pub const PARTITIONS: [Rgb; 7] = [
     [0, 114, 178],
 ];
 
-/// Colours for pixels per texel, on a logarithmic scale from 1/max to max.
+/// A scale of colours for pixels per texel, logarithmic from 1/max to max.
 ///
-/// Diverging, for 1 is where a texel is as large as a pixel: there the colour is a pale neutral;
-/// blue is finer (texels wasted), orange coarser (jagged). Equal ratios are equal steps of colour (by
-/// arc length in OKLab), both sides lose lightness alike, and blue against orange is safe for the
-/// colour-blind.
+/// The scale diverges from 1, where a texel is as large as a pixel and the colour is a pale
+/// neutral. Blue means finer (texels are wasted) and orange coarser (edges are jagged). Equal
+/// ratios are equal steps of colour (by arc length in OKLab), lightness falls alike on both sides,
+/// and colour-blind people can tell blue from orange.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorScale {
     max: f32,
 }
 
 impl Default for ErrorScale {
-    /// 1/32 to 32 pixels per texel; fixed, so that reports can be compared.
+    /// The scale from 1/32 to 32 pixels per texel. It is fixed, so that reports can be compared.
     fn default() -> Self {
         Self { max: 32.0 }
     }
 }
 
 impl ErrorScale {
-    /// From 1/`max` to `max` pixels per texel.
+    /// The scale from 1/`max` to `max` pixels per texel.
     ///
     /// # Errors
-    /// If `max` is not in (1, 10⁶].
+    /// `max` is not in (1, 10⁶].
     pub fn new(max: f32) -> Result<Self, Error> {
         if max > 1.0 && max <= 1e6 { Ok(Self { max }) } else { Err(Error::Scale { max }) }
     }
 
-    /// The largest error with a colour of its own, pixels per texel; the smallest is one over it.
+    /// The upper end of the scale, pixels per texel. The lower end is its reciprocal.
     pub fn max(self) -> f32 {
         self.max
     }
 
-    /// Where on the scale an error lies: −1 at 1/max and below, 0 at 1, 1 at max and above.
+    /// The position of an error on the scale: −1 at 1/max and below, 0 at 1, 1 at max and above.
     /// `None` for NaN.
     pub fn position(self, error_px: f32) -> Option<f32> {
         (!error_px.is_nan())
             .then(|| (error_px.max(f32::MIN_POSITIVE).ln() / self.max.ln()).clamp(-1.0, 1.0))
     }
 
-    /// The colour of an error in pixels per texel, `None` for NaN.
+    /// The colour of an error in pixels per texel; `None` for NaN.
     pub fn color(self, error_px: f32) -> Option<Rgb> {
         self.position(error_px).map(color_at)
     }
 }
 
-/// The scale's colour at a position in −1 ..= 1.
+/// The colour at a position on the scale, from −1 to 1.
 pub(crate) fn color_at(position: f32) -> Rgb {
     let middle = (DIVERGING.len() / 2) as f32;
     DIVERGING[(middle + middle * position.clamp(-1.0, 1.0)).round() as usize]
 }
 
-/// A mix of two colours, `amount` (0 ..= 1) of the second, by their sRGB values.
+/// A mix of two colours by their sRGB values; `amount`, from 0 to 1, is the share of the second.
 pub(crate) fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
     std::array::from_fn(|i| {
         let (a, b) = (f32::from(a[i]), f32::from(b[i]));
@@ -78,9 +78,9 @@ pub(crate) fn mix(a: Rgb, b: Rgb, amount: f32) -> Rgb {
     })
 }
 
-/// From 1/max to max.
+/// The colours of the scale, from 1/max to max.
 static DIVERGING: LazyLock<[Rgb; 513]> = LazyLock::new(|| {
-    // Lightness, chroma, hue in degrees (OKLCh), outwards from the middle.
+    // Lightness, chroma, and hue in degrees (OKLCh), from the middle outwards.
     let middle = [0.965, 0.006, 90.0];
     let finer = [
         middle,
@@ -103,7 +103,7 @@ static DIVERGING: LazyLock<[Rgb; 513]> = LazyLock::new(|| {
     })
 });
 
-/// The point at a share of the length of a polyline.
+/// The point of a polyline at a share of its length.
 fn along(points: &[[f32; 3]], share: f32) -> [f32; 3] {
     let length =
         |p: &[[f32; 3]]| p[0].iter().zip(p[1]).map(|(a, b)| (b - a).powi(2)).sum::<f32>().sqrt();
@@ -123,7 +123,7 @@ fn oklab_from_oklch([lightness, chroma, hue_deg]: [f32; 3]) -> [f32; 3] {
     [lightness, chroma * cos, chroma * sin]
 }
 
-/// Ottosson 2020, "A perceptual color space for image processing".
+/// Conversion of Ottosson 2020, "A perceptual color space for image processing".
 fn srgb_from_oklab([l, a, b]: [f32; 3]) -> Rgb {
     let lms = [
         l + 0.396_337_78 * a + 0.215_803_76 * b,
@@ -185,7 +185,8 @@ mod tests {
         a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
     }
 
-    /// Linear sRGB as dichromats see it: Machado et al. 2009, severity 1.
+    /// Matrices that take linear sRGB to the colours that dichromats see: Machado et al. 2009,
+    /// severity 1.
     const DICHROMATS: [[[f32; 3]; 3]; 3] = [
         [
             [0.152286, 1.052583, -0.204868],
@@ -224,7 +225,8 @@ mod tests {
                 let (finer, coarser) =
                     (seen(m, color_at(-p - 0.0625)), seen(m, color_at(p + 0.0625)));
                 assert!(distance(finer, coarser) > 0.03 + 0.1 * p, "at ±{p}");
-                // Lightness falls outwards on both sides, so that order shows without any hue.
+                // Lightness falls outwards on both sides, so that the order can be seen without
+                // hue.
                 for s in [-1.0, 1.0] {
                     let (inner, outer) =
                         (seen(m, color_at(s * p)), seen(m, color_at(s * (p + 0.0625))));

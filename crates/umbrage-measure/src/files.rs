@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Writes files completely or not at all.
 
 use crate::{Error, Image, Rgb};
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage};
@@ -7,19 +7,20 @@ use image::{ExtendedColorType, ImageEncoder};
 use std::io::{Cursor, Write};
 use std::path::Path;
 
-/// Writes `bytes` to a file that nobody ever sees unfinished: into a temporary one in the same
-/// folder, then renamed. An existing file is replaced; what is no plain file, such as a pipe or
-/// `/dev/stdout`, is written to.
+/// Writes `bytes` to a file that is never seen incomplete: they go to a temporary file in the same
+/// folder, which is then renamed. An existing file is replaced. If the path is not a regular file
+/// but, for example, a pipe or `/dev/stdout`, the bytes are written to it directly.
 ///
 /// # Errors
-/// If the folder does not exist or cannot be written; nothing stays behind then.
+/// The folder does not exist or cannot be written to. No temporary file is left behind then.
 pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     let path = path.as_ref();
     let is_device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".umbrage-");
-    // Temporary files are private by default; these become ordinary ones.
+    // Temporary files can only be read by their owner; this one gets the permissions of ordinary
+    // files.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let write = || {
@@ -34,7 +35,7 @@ pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     write().map_err(|source| Error::Write { path: path.to_owned(), source })
 }
 
-/// A kind of pixel that PNG files hold.
+/// A type of pixel that PNG files can store.
 pub trait PngPixel: Copy {
     #[doc(hidden)]
     const COLOR: ExtendedColorType;
@@ -42,7 +43,7 @@ pub trait PngPixel: Copy {
     fn bytes(pixels: &[Self]) -> &[u8];
 }
 
-/// Grey.
+/// Stored as grey.
 impl PngPixel for u8 {
     const COLOR: ExtendedColorType = ExtendedColorType::L8;
     fn bytes(pixels: &[Self]) -> &[u8] {
@@ -50,7 +51,7 @@ impl PngPixel for u8 {
     }
 }
 
-/// sRGB.
+/// Stored as sRGB.
 impl PngPixel for Rgb {
     const COLOR: ExtendedColorType = ExtendedColorType::Rgb8;
     fn bytes(pixels: &[Self]) -> &[u8] {
@@ -58,7 +59,7 @@ impl PngPixel for Rgb {
     }
 }
 
-/// Writes a PNG file, whole or not at all.
+/// Writes a PNG file, completely or not at all.
 ///
 /// # Errors
 /// As [`write_file`].
@@ -67,10 +68,10 @@ pub fn write_png<P: PngPixel>(path: impl AsRef<Path>, image: &Image<P>) -> Resul
     write_file(path, &encode_png(path, image)?)
 }
 
-/// The bytes of a PNG file, to be put into another file.
+/// The bytes of a PNG file, for use inside another file.
 ///
 /// # Errors
-/// A picture that the encoder refuses.
+/// The encoder refuses the picture.
 pub fn png<P: PngPixel>(image: &Image<P>) -> Result<Vec<u8>, Error> {
     encode_png(Path::new("embedded picture"), image)
 }
@@ -84,7 +85,7 @@ fn encode_png<P: PngPixel>(path: &Path, image: &Image<P>) -> Result<Vec<u8>, Err
     Ok(bytes)
 }
 
-/// A kind of pixel that EXR files hold.
+/// A type of pixel that EXR files can store.
 pub trait ExrPixel: Copy {
     #[doc(hidden)]
     const CHANNELS: &'static [&'static str];
@@ -92,7 +93,7 @@ pub trait ExrPixel: Copy {
     fn channel(self, index: usize) -> f32;
 }
 
-/// One channel, `Y`.
+/// Stored as one channel, `Y`.
 impl ExrPixel for f32 {
     const CHANNELS: &'static [&'static str] = &["Y"];
     fn channel(self, _: usize) -> f32 {
@@ -100,7 +101,7 @@ impl ExrPixel for f32 {
     }
 }
 
-/// `R`, `G`, `B`, linear.
+/// Stored as linear `R`, `G`, `B`.
 impl ExrPixel for [f32; 3] {
     const CHANNELS: &'static [&'static str] = &["R", "G", "B"];
     fn channel(self, index: usize) -> f32 {
@@ -108,7 +109,8 @@ impl ExrPixel for [f32; 3] {
     }
 }
 
-/// Writes an EXR file with the raw 32-bit floats, infinities and NaN included, whole or not at all.
+/// Writes an EXR file with the unchanged 32-bit floats, including infinities and NaN, completely or
+/// not at all.
 ///
 /// # Errors
 /// As [`write_file`].
@@ -174,7 +176,7 @@ mod tests {
         let missing = folder.path().join("no/such/folder/a.png");
         let error = write_file(&missing, b"x").unwrap_err().to_string();
         assert!(error.contains("a.png"), "{error}");
-        // A folder stands where the file should go.
+        // A folder already has the name of the file.
         let taken = folder.path().join("taken");
         std::fs::create_dir(&taken).unwrap();
         assert!(write_file(&taken, b"x").is_err());

@@ -3,7 +3,7 @@ use crate::Error;
 /// A colour, 8-bit sRGB.
 pub type Rgb = [u8; 3];
 
-/// One value a pixel, row by row from the upper left corner.
+/// An image with one value per pixel, row by row from the upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image<T> {
     size: [u32; 2],
@@ -11,7 +11,11 @@ pub struct Image<T> {
 }
 
 impl<T> Image<T> {
-    /// `size` is width and height, 1 to 65536 each; `pixels` has one value for each.
+    /// Makes an image of `size` (width and height, 1 to 65536 each) with one value of `pixels` per
+    /// pixel.
+    ///
+    /// # Errors
+    /// [`Error::Size`] or [`Error::Values`] if the two do not match.
     pub fn new(size: [u32; 2], pixels: Vec<T>) -> Result<Self, Error> {
         check_size(size)?;
         if pixels.len() as u64 != u64::from(size[0]) * u64::from(size[1]) {
@@ -20,7 +24,10 @@ impl<T> Image<T> {
         Ok(Self { size, pixels })
     }
 
-    /// Asks `value` for each pixel (column, row).
+    /// Makes an image by calling `value` with the column and row of each pixel.
+    ///
+    /// # Errors
+    /// [`Error::Size`] if width or height is not 1 to 65536.
     pub fn from_fn(size: [u32; 2], mut value: impl FnMut(u32, u32) -> T) -> Result<Self, Error> {
         check_size(size)?;
         let [w, h] = size;
@@ -33,7 +40,7 @@ impl<T> Image<T> {
         self.size
     }
 
-    /// Row by row from the upper left corner.
+    /// The values, row by row from the upper left corner.
     pub fn pixels(&self) -> &[T] {
         &self.pixels
     }
@@ -41,13 +48,13 @@ impl<T> Image<T> {
     /// The value at column `x` and row `y`.
     ///
     /// # Panics
-    /// If they lie outside.
+    /// The pixel lies outside the image.
     pub fn at(&self, x: u32, y: u32) -> &T {
         assert!(x < self.size[0] && y < self.size[1], "pixel ({x}, {y}) outside {:?}", self.size);
         &self.pixels[self.index(x, y)]
     }
 
-    /// The image of `f` of each value.
+    /// The image whose values are `f` of this image's values.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Image<U> {
         Image { size: self.size, pixels: self.pixels.iter().map(f).collect() }
     }
@@ -56,13 +63,13 @@ impl<T> Image<T> {
         y as usize * self.size[0] as usize + x as usize
     }
 
-    /// Column and row of the pixel at `index`.
+    /// Column and row of the pixel with this index.
     pub(crate) fn position(&self, index: usize) -> [u32; 2] {
         let width = self.size[0] as usize;
         [(index % width) as u32, (index / width) as u32]
     }
 
-    /// That this image has the truth's size.
+    /// Checks that this image has the size of the truth.
     pub(crate) fn check_like<U>(&self, truth: &Image<U>, what: &'static str) -> Result<(), Error> {
         if self.size == truth.size {
             return Ok(());

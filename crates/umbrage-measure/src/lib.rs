@@ -1,17 +1,19 @@
-//! Measures shadow images against truth, draws where they are wrong, and writes the report.
+//! Measures the visibility that a technique gives against the truth, draws where it is wrong, and
+//! writes the report.
 //!
 //! ```text
 //! truth ──────┐
 //! visibility ─┼─► measure ──► Metrics ─────────┐
-//! counted ────┘                                ├─► Report ─► write_report ─► report.json, index.html
-//! error_px ─────► measure_error_px ─► ErrorPx ─┘                ▲
+//! counted ────┘                                ├─► Report ─► write_report ─► report.json,
+//! error_px ─────► measure_error_px ─► ErrorPx ─┘                ▲            index.html
 //! all of them ──► write_pictures ──► Pictures ──────────────────┘
 //! ```
 //!
-//! *Counted* are the pixels that show a surface facing the light; all figures are over these. A
-//! visibility is 0 in shadow and 1 in light. Errors are pixels per texel: how many pixels wide a texel
-//! of the shadow map shows on the surface seen (perspective and projection; above 1 it looks jagged).
-//! Images run row by row from the upper left.
+//! *Counted* pixels are those that show a surface facing the light; all figures are over these
+//! pixels. A visibility is 0 in shadow and 1 in light. Errors are in pixels per texel: how many
+//! pixels wide a texel of the shadow map appears on the visible surface (from perspective and
+//! projection; above 1, edges look jagged). Images are stored row by row from the upper left
+//! corner.
 
 mod color;
 mod error;

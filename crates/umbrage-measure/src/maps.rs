@@ -1,21 +1,22 @@
-//! Pictures made of measurements: what is wrong, how coarse, which map, where its texels lie.
+//! Pictures made of measurements: where visibility is wrong, how large the error is, which map
+//! serves a pixel, and where texels lie.
 
 use crate::color::{FALSE_LIGHT, FALSE_SHADOW, PARTITIONS, mix};
 use crate::metrics::check_visibilities;
 use crate::{Error, ErrorScale, Image, Rgb};
 
-/// An 8-bit grey for a visibility in 0 (in shadow, black) ..= 1 (lit, white); values beyond are
-/// clamped, NaN is black.
+/// 8-bit grey for a visibility from 0 (in shadow, black) to 1 (lit, white). Values outside are
+/// clamped, and NaN is black.
 pub fn grey(visibility: f32) -> u8 {
     (visibility.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// Truth against technique, over the dimmed `picture`: [`FALSE_LIGHT`] where the technique is lighter
-/// than the truth, [`FALSE_SHADOW`] where it is darker, as opaque as the difference is large. Pixels not
-/// counted are dimmed further.
+/// The difference between truth and technique, over the dimmed `picture`: [`FALSE_LIGHT`] where the
+/// technique is lighter than the truth, [`FALSE_SHADOW`] where it is darker. The opacity is the
+/// difference. Pixels that are not counted are dimmed further.
 ///
 /// # Errors
-/// Sizes that differ, or a visibility that is not finite at a counted pixel.
+/// The sizes differ, or a visibility at a counted pixel is not finite.
 pub fn difference_map(
     truth: &Image<f32>,
     technique: &Image<f32>,
@@ -34,11 +35,11 @@ pub fn difference_map(
     })
 }
 
-/// Errors in pixels per texel by the colours of `scale`; pixels not counted show the dimmed `picture`,
-/// counted ones whose error is NaN (no map serves them) are hatched.
+/// Errors in pixels per texel, in the colours of `scale`. Pixels that are not counted show the
+/// dimmed `picture`. Counted pixels whose error is NaN, because no map serves them, are hatched.
 ///
 /// # Errors
-/// Sizes that differ.
+/// The sizes differ.
 pub fn error_map(
     error_px: &Image<f32>,
     counted: &Image<bool>,
@@ -56,11 +57,12 @@ pub fn error_map(
     })
 }
 
-/// How much pixels sparkle, over the dimmed `picture`: [`FALSE_LIGHT`], as opaque as four times the noise, so that what changes by a quarter from frame to
-/// frame is solid. NaN: dimmed further.
+/// The noise of each pixel, over the dimmed `picture`: [`FALSE_LIGHT`] with an opacity of four
+/// times the noise, so that a pixel which changes by a quarter from frame to frame is opaque.
+/// Pixels whose noise is NaN are dimmed further.
 ///
 /// # Errors
-/// Sizes that differ.
+/// The sizes differ.
 pub fn noise_map(noise: &Image<f32>, picture: &Image<Rgb>) -> Result<Image<Rgb>, Error> {
     picture.check_like(noise, "picture")?;
     Image::from_fn(noise.size(), |x, y| {
@@ -70,11 +72,12 @@ pub fn noise_map(noise: &Image<f32>, picture: &Image<Rgb>) -> Result<Image<Rgb>,
     })
 }
 
-/// Which map of a plan serves each pixel: the dimmed `picture` tinted by the map's index in
-/// [`PARTITIONS`], which repeats. `None`: no map; only dimmed.
+/// The map that serves each pixel: the dimmed `picture`, tinted by the colour in [`PARTITIONS`] of
+/// the map's index in its plan. The colours repeat. Pixels with `None`, which no map serves, are
+/// only dimmed.
 ///
 /// # Errors
-/// Sizes that differ.
+/// The sizes differ.
 pub fn partition_map(
     map_index: &Image<Option<u16>>,
     picture: &Image<Rgb>,
@@ -84,26 +87,27 @@ pub fn partition_map(
         let below = *picture.at(x, y);
         map_index.at(x, y).map_or(dimmed(below, false), |i| {
             let tint = PARTITIONS[usize::from(i) % PARTITIONS.len()];
-            // Shading stays visible: the tint at the picture's own lightness.
+            // The tint takes the lightness of the picture, so that the shading stays visible.
             mix([0; 3], tint, 0.25 + 0.75 * luma(below) / 255.0)
         })
     })
 }
 
-/// The map's texels as they lie on the surfaces: a line every 5 texels over the `picture` (Lloyd et
-/// al. 2006, Fig. 15). `texel` is (s, t) of each pixel times the map's resolution, NaN where no map
-/// serves it. Lines that would be too dense to see fade into an even tint.
+/// The texels of a map as they lie on the surfaces: a line every 5 texels over the `picture` (Lloyd
+/// et al. 2006, Fig. 15). `texel` is the (s, t) of each pixel times the resolution of the map, or
+/// NaN where no map serves the pixel. Lines that would be too dense to see fade into a uniform
+/// tint.
 ///
 /// # Errors
-/// Sizes that differ.
+/// The sizes differ.
 pub fn texel_map(texel: &Image<[f32; 2]>, picture: &Image<Rgb>) -> Result<Image<Rgb>, Error> {
     const PERIOD: f32 = 5.0;
     const LINE: Rgb = FALSE_LIGHT;
     /// Width of a line, pixels.
     const WIDTH: f32 = 1.2;
-    /// Lines per pixel from where on they fade, and at which they are gone.
+    /// Density in lines per pixel at which lines begin to fade, and at which they have vanished.
     const FADE: [f32; 2] = [1.0 / 6.0, 1.0 / 3.0];
-    /// What is left of them then.
+    /// Opacity of the tint that replaces them.
     const TINT: f32 = 0.3;
     picture.check_like(texel, "picture")?;
     Image::from_fn(texel.size(), |x, y| {
@@ -124,8 +128,8 @@ pub fn texel_map(texel: &Image<[f32; 2]>, picture: &Image<Rgb>) -> Result<Image<
     })
 }
 
-/// How fast coordinate `axis` changes from pixel to pixel. Of the neighbours on either side the one
-/// that differs less counts: the other may lie on another surface.
+/// Change of coordinate `axis` from pixel to pixel. Of the two neighbours on either side, the one
+/// that differs less counts, because the other may lie on another surface.
 fn gradient(texel: &Image<[f32; 2]>, x: u32, y: u32, axis: usize) -> f32 {
     let [w, h] = texel.size();
     let here = texel.at(x, y)[axis];
@@ -140,7 +144,7 @@ fn gradient(texel: &Image<[f32; 2]>, x: u32, y: u32, axis: usize) -> f32 {
     known(dx).hypot(known(dy))
 }
 
-/// Grey and darker, so that colours over it stand out.
+/// A darker grey, on which colours stand out.
 fn dimmed(color: Rgb, counted: bool) -> Rgb {
     let strength = if counted { 0.4 } else { 0.2 };
     [(luma(color) * strength + 14.0) as u8; 3]
@@ -190,17 +194,18 @@ mod tests {
 
     #[test]
     fn texel_lines_come_every_five() {
-        // A texel a tenth of a pixel column wide: a line every 50 columns, and none along t.
+        // A column of pixels is a tenth of a texel wide: there is a line every 50 columns, and none
+        // along t.
         let texel = Image::from_fn([200, 8], |x, _| [x as f32 * 0.1, 2.5]).unwrap();
         let picture = texel.map(|_| [0, 0, 0]);
         let map = texel_map(&texel, &picture).unwrap();
         let lines: Vec<u32> = (0..200).filter(|&x| *map.at(x, 4) == FALSE_LIGHT).collect();
         assert_eq!(lines, [0, 50, 100, 150]);
-        // 20 texels a pixel: no lines to see, an even tint.
+        // With 20 texels per pixel no lines can be seen, and the tint is uniform.
         let dense = Image::from_fn([50, 8], |x, _| [x as f32 * 20.3, 2.5]).unwrap();
         let map = texel_map(&dense, &dense.map(|_| [0, 0, 0])).unwrap();
         assert!(map.pixels().iter().all(|c| c == map.at(0, 0)));
-        // Nothing served: only dimmed.
+        // Where no map serves a pixel, the picture is only dimmed.
         let none = image([2, 2], &[[f32::NAN; 2]; 4]);
         let map = texel_map(&none, &none.map(|_| [255; 3])).unwrap();
         assert_eq!(map.pixels(), [[65; 3]; 4]);

@@ -3,53 +3,54 @@ use serde::{Deserialize, Serialize};
 
 /// How far a technique's visibility is from the truth, over the counted pixels.
 ///
-/// Without a counted pixel there is nothing to measure: [`counted`](Self::counted) is 0 and all the
-/// rest is `None` (JSON `null`), not a flattering 0.
+/// Without counted pixels nothing can be measured: [`counted`](Self::counted) is 0 and all other
+/// fields are `None` (JSON `null`), and not 0, which would look like perfection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
-    /// How many pixels were counted.
+    /// Number of counted pixels.
     #[serde(default, rename = "counted_pixels")]
     pub counted: u64,
-    /// Share whose visibility differs from the truth by more than 1/2; 0 ..= 1.
+    /// Share of pixels whose visibility differs from the truth by more than 1/2; from 0 to 1.
     pub wrong_fraction: Option<f64>,
-    /// The part of `wrong_fraction` that is lit and should be dark: leaks, detached shadows.
+    /// The part of `wrong_fraction` that is lit and should be dark, as with leaks and detached
+    /// shadows.
     #[serde(default)]
     pub false_light: Option<f64>,
-    /// The part of `wrong_fraction` that is dark and should be lit: acne, jagged edges.
+    /// The part of `wrong_fraction` that is dark and should be lit, as with acne and jagged edges.
     #[serde(default)]
     pub false_shadow: Option<f64>,
-    /// Mean of |visibility − truth|; 0 ..= 1.
+    /// Mean of |visibility − truth|, from 0 to 1.
     pub mean_abs_error: Option<f64>,
-    /// Mean of ꟻLIP (Andersson et al. 2020) between the two visibility images, shown as 8-bit grey at
+    /// Mean of ꟻLIP (Andersson et al. 2020) between the two visibility images as 8-bit grey, at
     /// [`nv_flip::DEFAULT_PIXELS_PER_DEGREE`] (67, a desktop monitor), over all pixels of the
-    /// picture; those not counted take the truth's value in both. 0 ..= 1.
+    /// picture. Pixels that are not counted have the truth's value in both images. From 0 to 1.
     pub flip: Option<f64>,
 }
 
-/// The distribution of the shadow map's error over the counted pixels, pixels per texel.
+/// The distribution of the shadow map's error over the counted pixels, in pixels per texel.
 ///
-/// Percentiles are by nearest rank: the smallest value that at least that share of pixels does not
-/// exceed. All `None` if no counted pixel has a finite error.
+/// Percentiles are by nearest rank: the smallest value that is not exceeded by at least that share
+/// of the pixels. All are `None` if no counted pixel has a finite error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorPx {
     /// Median.
     pub p50: Option<f64>,
     /// 95th percentile.
     pub p95: Option<f64>,
-    /// Largest.
+    /// Largest error.
     pub max: Option<f64>,
-    /// Counted pixels left out because their error is not finite: no map serves them, or the surface
-    /// is edge-on to the light.
+    /// Number of counted pixels that are left out because their error is not finite: no map serves
+    /// them, or the surface is edge-on to the light.
     #[serde(default)]
     pub undefined: u64,
 }
 
-/// Compares `technique` with `truth`, both visibilities in 0 (in shadow) ..= 1 (lit); values beyond
-/// (filters that ring) count as the nearer end. `counted` marks the pixels that show a surface facing
-/// the light; values elsewhere do not matter.
+/// Compares `technique` with `truth`. Both are visibilities from 0 (in shadow) to 1 (lit); values
+/// outside, which filters that overshoot give, are clamped. `counted` marks the pixels that show a
+/// surface facing the light; values at other pixels do not matter.
 ///
 /// # Errors
-/// Sizes that differ, or a visibility that is not finite at a counted pixel.
+/// The sizes differ, or a visibility at a counted pixel is not finite.
 pub fn measure(
     truth: &Image<f32>,
     technique: &Image<f32>,
@@ -77,11 +78,11 @@ pub fn measure(
     })
 }
 
-/// The distribution of `error`, pixels per texel, over the `counted` pixels. Values that are not
-/// finite are left out and reported as [`ErrorPx::undefined`].
+/// The distribution of `error`, in pixels per texel, over the `counted` pixels. Values that are not
+/// finite are left out and counted in [`ErrorPx::undefined`].
 ///
 /// # Errors
-/// Sizes that differ.
+/// The sizes differ.
 pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<ErrorPx, Error> {
     error.check_like(counted, "error")?;
     let all = error.pixels().iter().zip(counted.pixels()).filter(|&(_, &counted)| counted);
@@ -100,9 +101,9 @@ pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<Err
     })
 }
 
-/// The centre of the square of 32×32 pixels in which `technique` is most wrong (largest sum of
-/// |technique − truth|): a place worth a close look. `None` if it is right everywhere. Takes
-/// visibilities, or any other values in 0 ..= 1 such as the pictures' brightness.
+/// The centre of the square of 32×32 pixels in which `technique` is most wrong, by the
+/// sum of |technique − truth|; `None` if it is right everywhere. The values are visibilities or any
+/// others from 0 to 1, such as the brightness of pictures.
 ///
 /// # Errors
 /// As [`measure`].
@@ -121,7 +122,8 @@ pub fn worst_spot(
         sums[(y / SIDE) as usize * columns + (x / SIDE) as usize] +=
             f64::from(difference.unwrap_or(0.0).abs());
     }
-    // The first of equals, so that the answer does not depend on how the maximum is searched.
+    // Of equal maxima the first one is taken, so that the result does not depend on the order of
+    // the search.
     let mut worst = 0;
     for (i, sum) in sums.iter().enumerate() {
         if *sum > sums[worst] {
@@ -133,7 +135,7 @@ pub fn worst_spot(
     Ok((sums[worst] > 0.0).then(|| [center(cell[0], w), center(cell[1], h)]))
 }
 
-/// `technique` − `truth` at each pixel; `None` where it is not counted.
+/// `technique` − `truth` at each pixel; `None` where the pixel is not counted.
 fn differences<'a>(
     truth: &'a Image<f32>,
     technique: &'a Image<f32>,
@@ -177,7 +179,8 @@ fn flip(truth: &Image<f32>, technique: &Image<f32>, counted: &Image<bool>) -> f6
         nv_flip::FlipImageRgb8::with_data(w, h, &rgb)
     };
     let map = nv_flip::flip(picture(truth), picture(technique), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
-    // Summed here in f64: the pool of `nv_flip` sums in f32 and keeps a histogram besides.
+    // The sum is made here in double precision, because the pool of `nv_flip` sums in single
+    // precision and also keeps a histogram.
     let values = map.to_vec();
     values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
 }
@@ -192,8 +195,8 @@ mod tests {
 
     #[test]
     fn counts_by_definition() {
-        // Wrong needs *more* than 1/2; the fourth pixel would be wrong but is not counted; values
-        // beyond 0 ..= 1 count as the nearer end.
+        // A pixel is wrong if it differs by *more* than 1/2. The fourth pixel would be wrong but is
+        // not counted. Values outside 0 to 1 are clamped.
         let truth = image([6, 1], &[0.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
         let technique = image([6, 1], &[1.0, 0.0, 0.5, 1.0, 0.75, 1.5]);
         let counted = image([6, 1], &[true, true, true, false, true, true]);
@@ -214,8 +217,8 @@ mod tests {
         let upper = Image::from_fn(size, |_, y| y < 15).unwrap();
         assert_eq!(measure(&truth, &truth, &all).unwrap().flip, Some(0.0));
         assert_eq!(measure(&truth, &half, &upper).unwrap().flip, Some(0.0));
-        // A quarter of the picture turned from white to black: ꟻLIP is near 1 inside, and its filter
-        // spreads it by a few pixels.
+        // A quarter of the picture changes from white to black: ꟻLIP is near 1 inside the quarter,
+        // and its filter spreads it by a few pixels.
         let flip = measure(&truth, &half, &all).unwrap().flip.unwrap();
         assert!((0.2..0.35).contains(&flip), "{flip}");
     }
@@ -259,7 +262,8 @@ mod tests {
 
     #[test]
     fn percentiles_are_by_nearest_rank() {
-        // 1 … 100 in an order of no help, one uncounted outlier, and two without a finite error.
+        // The values 1 to 100 in shuffled order, one outlier that is not counted, and two values
+        // that are not finite.
         let mut values: Vec<f32> = (0..100).map(|i| (i * 37 % 100 + 1) as f32).collect();
         values.extend([1e9, f32::INFINITY, f32::NAN]);
         let error = image([103, 1], &values);
@@ -278,7 +282,8 @@ mod tests {
             Image::from_fn([100, 70], |x, y| f32::from(!(x > 96 && y > 64 || x < 2 && y < 2)))
                 .unwrap();
         let all = truth.map(|_| true);
-        // The lower right cell is cut off by the picture's edge; its centre stays inside.
+        // The square at the lower right is cut off by the edge of the picture; its centre stays
+        // inside.
         assert_eq!(worst_spot(&truth, &technique, &all).unwrap(), Some([99, 69]));
         assert_eq!(worst_spot(&truth, &truth, &all).unwrap(), None);
     }

@@ -1,4 +1,4 @@
-//! The pictures of a comparison, as files beside its report.
+//! Writes the pictures of a comparison as files beside its report.
 
 use crate::maps::luma;
 use crate::{
@@ -6,59 +6,60 @@ use crate::{
 };
 use std::path::Path;
 
-/// The file of the truth's shaded picture.
+/// Name of the file with the truth's shaded picture.
 pub(crate) const TRUTH_COLOR: &str = "truth-color.png";
 
-/// What was seen with one technique, all of the same size.
+/// The images of one technique, all of the same size.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// The shaded picture.
     pub color: &'a Image<Rgb>,
-    /// 0 (in shadow) ..= 1 (lit).
+    /// Visibility from 0 (in shadow) to 1 (lit).
     pub visibility: &'a Image<f32>,
     /// Pixels per texel on the surface; NaN where no map serves it.
     pub error_px: &'a Image<f32>,
-    /// From [`partition_map`](crate::partition_map), if wanted.
+    /// The picture by [`partition_map`](crate::partition_map), if wanted.
     pub partition: Option<&'a Image<Rgb>>,
-    /// From [`texel_map`](crate::texel_map), if wanted.
+    /// The picture by [`texel_map`](crate::texel_map), if wanted.
     pub texels: Option<&'a Image<Rgb>>,
 }
 
-/// What was seen by rays.
+/// The images of the ray-traced truth, all of the same size.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenTruth<'a> {
     /// The shaded picture.
     pub color: &'a Image<Rgb>,
-    /// 0 (in shadow) ..= 1 (lit).
+    /// Visibility from 0 (in shadow) to 1 (lit).
     pub visibility: &'a Image<f32>,
-    /// Pixels that show a surface facing the light.
+    /// Which pixels show a surface facing the light.
     pub counted: &'a Image<bool>,
 }
 
-/// The names of one technique's (or the truth's) PNG files, relative to the report's folder.
+/// Names of the PNG files of one technique (or of the truth), relative to the report's folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pictures {
     /// The shaded picture.
     pub color: String,
-    /// 8-bit grey: 255 lit, 0 in shadow.
+    /// The visibility as 8-bit grey: 255 lit, 0 in shadow.
     pub visibility: String,
-    /// [`difference_map`]; not for the truth.
+    /// The [`difference_map`]; `None` for the truth.
     pub difference: Option<String>,
-    /// [`error_map`]; not for the truth.
+    /// The [`error_map`]; `None` for the truth.
     pub error: Option<String>,
-    /// [`partition_map`](crate::partition_map).
+    /// The [`partition_map`](crate::partition_map), if there is one.
     pub partition: Option<String>,
-    /// [`texel_map`](crate::texel_map).
+    /// The [`texel_map`](crate::texel_map), if there is one.
     pub texels: Option<String>,
-    /// Where the picture is most visibly wrong, column and row ([`worst_spot`] by brightness; a wrong
-    /// visibility where light just grazes a surface hardly shows).
+    /// Column and row where the picture is most visibly wrong: the [`worst_spot`] of the pictures'
+    /// brightness. Visibility would not do, because a wrong visibility hardly shows where light
+    /// grazes a surface.
     pub worst_spot: Option<[u32; 2]>,
 }
 
-/// Writes the truth's pictures into `folder`: `truth-color.png`, `truth-visibility.png`.
+/// Writes the truth's pictures into `folder`: `truth-color.png` and `truth-visibility.png`.
 ///
 /// # Errors
-/// Sizes that differ, or files that cannot be written.
+/// The sizes differ, or a file cannot be written.
 pub fn write_truth_pictures(
     folder: impl AsRef<Path>,
     truth: &SeenTruth<'_>,
@@ -79,8 +80,7 @@ pub fn write_truth_pictures(
 /// `<index>-<shadows>-<kind>.png` with an index from 1.
 ///
 /// # Errors
-/// Sizes that differ, a visibility that is not finite at a counted pixel, or files that cannot be
-/// written.
+/// The sizes differ, a visibility at a counted pixel is not finite, or a file cannot be written.
 pub fn write_pictures(
     folder: impl AsRef<Path>,
     index: usize,
@@ -117,7 +117,7 @@ pub fn write_pictures(
     })
 }
 
-/// A shadow specification as part of a file name that every system and every URL takes.
+/// A shadow specification as a part of a file name that is valid on every system and in every URL.
 fn file_stem(shadows: &str) -> String {
     let safe = |c: char| c.is_ascii_alphanumeric() || c == '.' || c == '_';
     let dashed: String = shadows.chars().map(|c| if safe(c) { c } else { '-' }).collect();

@@ -1,163 +1,168 @@
 use crate::{Error, ErrorPx, Metrics};
 use serde::{Deserialize, Serialize};
 
-/// `report.json`: what was compared and how far each technique is from the truth.
+/// The content of `report.json`: what was compared, and how far each technique is from the truth.
 ///
-/// Figures that may be unknown are `Option`; they and figures that are not finite become JSON
+/// Figures that may be unknown are `Option`s. `None` and figures that are not finite become JSON
 /// `null`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// The scene's name.
+    /// Name of the scene.
     pub scene: String,
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// Who looks on.
+    /// The camera.
     pub view: View,
-    /// What shines.
+    /// The light.
     pub light: LightInfo,
-    /// How the truth was made.
+    /// How the truth was computed.
     pub truth: Truth,
-    /// What [`Measured::flicker`] was measured in; `None` if nothing moved.
+    /// The motion in which [`Measured::flicker`] and [`Measured::noise`] were measured; `None` if
+    /// the view did not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
-    /// One a shadow specification, in the order they were asked for.
+    /// The results, one for each shadow specification, in the order in which these were requested.
     pub results: Vec<Measured>,
 }
 
-/// The camera.
+/// The camera of a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
-    /// The camera's name in the scene's file, if it is from there.
+    /// Name of the camera in the scene's file; `None` if the camera is not from there.
     #[serde(default)]
     pub name: Option<String>,
-    /// World position, metres.
+    /// Position of the eye in world space, metres.
     pub eye: [f64; 3],
-    /// A world point in the middle of the picture, metres.
+    /// The world point in the middle of the picture, metres.
     pub target: [f64; 3],
-    /// Up in the picture.
+    /// The direction that is up in the picture.
     pub up: [f64; 3],
     /// Vertical field of view, degrees.
     pub fov: f64,
-    /// Nearest and farthest distance along the view direction that are drawn, metres.
+    /// Near distance along the view direction, metres.
     pub near: f64,
-    /// See `near`.
+    /// Far distance along the view direction, metres.
     pub far: f64,
 }
 
-/// The light.
+/// The light of a report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum LightInfo {
-    /// Parallel light.
+    /// A directional light.
     Directional {
-        /// The light's name in the scene's file, if it is from there.
+        /// Name of the light in the scene's file; `None` if the light is not from there.
         #[serde(default)]
         name: Option<String>,
-        /// The way it travels, unit length.
+        /// The direction in which the light travels, unit length.
         direction: [f64; 3],
     },
-    /// A cone of light from one point.
+    /// A spot light.
     Spot {
-        /// The light's name in the scene's file, if it is from there.
+        /// Name of the light in the scene's file; `None` if the light is not from there.
         #[serde(default)]
         name: Option<String>,
-        /// World position, metres.
+        /// Position in world space, metres.
         position: [f64; 3],
-        /// Axis of the cone, the way it travels, unit length.
+        /// Axis of the cone in the direction in which the light travels, unit length.
         direction: [f64; 3],
         /// Half the cone's opening angle, degrees.
         half_angle: f64,
-        /// Distance along the axis where light ends, metres.
+        /// Distance along the axis at which the light ends, metres.
         range: f64,
     },
-    /// Light from one point in all directions.
+    /// A point light.
     Point {
-        /// The light's name in the scene's file, if it is from there.
+        /// Name of the light in the scene's file; `None` if the light is not from there.
         #[serde(default)]
         name: Option<String>,
-        /// World position, metres.
+        /// Position in world space, metres.
         position: [f64; 3],
-        /// Distance where light ends, metres.
+        /// Distance at which the light ends, metres.
         range: f64,
     },
 }
 
-/// How the truth was made.
+/// How the truth was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// Primary rays a pixel, each with a shadow ray at the light.
+    /// Number of primary rays per pixel; each has one shadow ray to the light itself.
     pub rays_per_pixel: u32,
-    /// Wall-clock time to trace it all, seconds.
+    /// Wall-clock time of tracing all rays, seconds.
     pub seconds: Option<f64>,
 }
 
-/// Frames that follow one another.
+/// A motion: a sequence of frames.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Motion {
-    /// What moves and how, in a word: `dolly`, `orbit`, `sun`.
+    /// What moves: `dolly`, `orbit` or `sun`.
     pub kind: String,
-    /// How many frames there are, the first of them the report's own view.
+    /// Number of frames. The first one is the report's own view.
     pub frames: u32,
 }
 
-/// One technique's figures.
+/// The figures of one technique.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// The shadow specification as it was asked for, e.g. `lispsm@1024`.
+    /// The shadow specification in the words of the request, such as `lispsm@1024`.
     pub shadows: String,
     /// The technique that was executed, as `umbrage::Technique` prints it: with the texels that an
-    /// option asked for, without what is so by default.
+    /// option requested, and without defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub technique: Option<String>,
-    /// What executed the plan: `reference` or `gpu`.
+    /// The executor of the plan: `reference` or `gpu`.
     pub backend: String,
-    /// The GPU's name.
+    /// Name of the GPU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
     /// Number of shadow maps.
     pub maps: u32,
-    /// Texels of all maps together.
+    /// Number of texels of all maps together.
     pub texels: u64,
-    /// Memory of what lookup reads, bytes: depths, or the numbers that a filter stores in their place, gutters and smaller copies included.
+    /// Memory that lookups read, bytes: depths or, with a prefilter, the statistics in prefiltered
+    /// maps; gutters and mip levels included.
     #[serde(default)]
     pub bytes: Option<u64>,
-    /// Distance from the truth; its fields stand beside these in the JSON.
+    /// Distance from the truth. In the JSON, these fields stand beside the others.
     #[serde(flatten)]
     pub metrics: Metrics,
-    /// Pixels per texel on the surfaces seen.
+    /// Pixels per texel on the visible surfaces.
     pub error_px: ErrorPx,
     /// Texels needed per pixel of the picture for an error of 1 (Lloyd et al. 2006, Eq. 12).
     pub storage_factor: Option<f64>,
-    /// Share of the triangles that need not be drawn into a map, the mean over maps that serve anything.
+    /// Share of the triangles that need not be drawn into a map, as the mean over the maps that
+    /// serve any receivers.
     #[serde(default)]
     pub casters_culled: Option<f64>,
-    /// Mean change of visibility from one frame to the next, of what counts in both and where the truth does
-    /// not change; for hard shadows the share that changes. `None` if nothing moved.
+    /// Mean change of visibility from one frame to the next, over the points that count in both
+    /// frames and where the truth does not change. For hard shadows this is the share of points
+    /// that change. `None` if the view did not move.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flicker: Option<f64>,
-    /// Mean change, from one frame to the next, of a pixel's error against the mean of many true values all over it: 0 where pixels do not sparkle. `None` if
-    /// it was not measured.
+    /// Mean change, from one frame to the next, of a pixel's error against the mean of many true
+    /// values spread over the pixel. 0 if no pixel sparkles. `None` if noise was not measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<f64>,
-    /// Wall-clock times.
+    /// Wall-clock times of the stages.
     pub ms: Times,
 }
 
-/// Wall-clock times of a technique's stages, milliseconds; `None` for a stage it does not have.
+/// Wall-clock times of a technique's stages, milliseconds. `None` for a stage that the technique
+/// does not have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Times {
-    /// Planning the maps.
+    /// Time to plan the maps.
     pub plan: Option<f64>,
-    /// Rendering the maps.
+    /// Time to render the maps.
     pub depth: Option<f64>,
-    /// Filtering them ahead of lookup.
+    /// Time to filter the maps ahead of lookup.
     pub filter: Option<f64>,
-    /// Looking them up for the picture.
+    /// Time to look the maps up for the picture.
     pub shade: Option<f64>,
 }
 
 impl Times {
-    /// All stages together, milliseconds; `None` if none is known.
+    /// Time of all stages together, milliseconds; `None` if no time is known.
     pub fn total(&self) -> Option<f64> {
         let known = [self.plan, self.depth, self.filter, self.shade].into_iter().flatten();
         known.reduce(|a, b| a + b)
@@ -165,7 +170,7 @@ impl Times {
 }
 
 impl Report {
-    /// The text of `report.json`. Floats keep every bit.
+    /// The text of `report.json`. Floats are written with full precision.
     ///
     /// # Errors
     /// None for reports that this crate's types can hold.
@@ -176,7 +181,7 @@ impl Report {
     /// Reads the text of a `report.json`.
     ///
     /// # Errors
-    /// Text that is not JSON, or lacks a field; the message names it and the place.
+    /// The text is not JSON or lacks a field. The message names the field and its place.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         Ok(serde_json::from_str(text)?)
     }
@@ -187,7 +192,8 @@ pub(crate) mod tests {
     use super::*;
     use serde_json::{Value, json};
 
-    /// A report with a result of each given share of wrong pixels; `None`: nothing counted.
+    /// A report with one result for each given share of wrong pixels; `None` for a result without
+    /// counted pixels.
     pub(crate) fn report(wrong: &[Option<f64>]) -> Report {
         let result = |(i, &wrong): (usize, &Option<f64>)| Measured {
             shadows: format!("lambda={i}@1024"),
@@ -260,7 +266,8 @@ pub(crate) mod tests {
         assert_eq!(json["results"], json!([expected]));
     }
 
-    /// Reports of views that stand still, and those from before there were motions, say nothing of one.
+    /// Reports without motion, and reports from versions before there was motion, have no field for
+    /// it.
     #[test]
     fn motion_is_told_where_there_was_one() {
         let mut report = report(&[Some(0.25)]);

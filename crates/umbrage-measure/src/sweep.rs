@@ -1,79 +1,82 @@
-//! Comparisons in many views, as tables and means.
+//! Comparisons over many views, with their tables and means.
 
 use crate::{Error, ErrorPx, LightInfo, Measured, Metrics, Report, View};
 use serde::{Deserialize, Serialize};
 
-/// The same techniques compared in many views.
+/// A comparison of the same techniques in many views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// What it is called on the page.
+    /// Name of the sweep, the page's title.
     pub name: String,
-    /// Which part of the views this is, as `2/8`; `None`: all.
+    /// The share of the views that this sweep has, such as `2/8`; `None` if it has all views.
     pub share: Option<String>,
-    /// What was asked for in every view.
+    /// The settings that all views have in common.
     pub settings: SweepSettings,
-    /// In the order they were asked for.
+    /// The views, in the order in which they were requested.
     pub views: Vec<SweptView>,
 }
 
-/// What all views of a sweep have in common.
+/// The settings that all views of a sweep have in common.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepSettings {
     /// The shadow specifications.
     pub shadows: Vec<String>,
-    /// Pixels per texel at most, where a specification says nothing of texels; `None`: the default budget.
+    /// Largest number of pixels per texel, for specifications that do not state texels. `None`:
+    /// those have the default budget.
     pub max_error: Option<f64>,
-    /// Width and height of the pictures, pixels, where a view has none of its own.
+    /// Width and height of the pictures, pixels, for views that do not state a size.
     pub size: [u32; 2],
-    /// Rays along each side of a pixel.
+    /// Number of rays along each side of a pixel.
     pub samples: u32,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
-    /// What the maps are fitted to: `box` or `surfaces`.
+    /// Which receivers the maps are fitted to: those in one `box`, or the `surfaces`.
     pub fit: String,
-    /// What renders the shadow maps.
+    /// The executor that renders the shadow maps.
     pub backend: String,
 }
 
 /// One view of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweptView {
-    /// Its name, which no other view of the sweep has.
+    /// Name of the view, different for each view of the sweep.
     pub name: String,
-    /// The scene as it was asked for.
+    /// The scene, in the words of the request.
     pub scene: String,
-    /// Where its report lies, relative to the sweep's folder, with `/` between names.
+    /// The folder of the view's report, relative to the sweep's folder, with `/` between names.
     pub folder: String,
-    /// Its report, with one result for each of the sweep's specifications in their order, or why there is
-    /// none.
+    /// The view's report, with one result for each of the sweep's specifications in their order, or
+    /// the reason why there is none.
     pub outcome: Result<Report, String>,
 }
 
-/// What one specification comes to over all views in which anything was counted.
+/// The means of one specification's figures, over all views that have counted pixels.
 ///
-/// A geometric mean weighs each view alike, however hard it is, and has the same ratios whatever is
-/// compared with whatever. It knows no zero: a view with no wrong pixel would outweigh all the others.
-/// So a figure counts as no less than one wrong pixel of the view, 1 / counted pixels, which is what the
-/// view can resolve.
+/// A geometric mean weighs all views alike, however hard they are, and the ratio of two means does
+/// not depend on which techniques are compared. It cannot contain a zero: a view without a wrong
+/// pixel would outweigh all others. Each figure is therefore raised to at least one wrong pixel of
+/// its view, 1 / counted pixels, which is the least difference that the view can resolve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mean {
     /// The shadow specification.
     pub shadows: String,
-    /// How many views were counted.
+    /// Number of views that the means are over.
     pub views: usize,
     /// Geometric mean of [`Metrics::wrong_fraction`]; `None` if no view was counted.
     pub wrong_fraction: Option<f64>,
-    /// How many views entered that mean as one wrong pixel, being less.
+    /// Number of views whose figure was smaller than one wrong pixel and was raised to it in this
+    /// mean.
     pub wrong_fraction_raised: usize,
     /// Geometric mean of [`Metrics::mean_abs_error`]; `None` if no view was counted.
     pub mean_abs_error: Option<f64>,
-    /// How many views entered that mean as one wrong pixel, being less.
+    /// Number of views whose figure was smaller than one wrong pixel and was raised to it in this
+    /// mean.
     pub mean_abs_error_raised: usize,
 }
 
 impl Report {
-    /// The same without its wall-clock times, which differ from run to run.
+    /// The report without wall-clock times, which differ from run to run.
     pub fn without_times(mut self) -> Self {
         self.truth.seconds = None;
         self.results.iter_mut().for_each(|r| r.ms = crate::Times::default());
@@ -82,14 +85,14 @@ impl Report {
 }
 
 impl SweptView {
-    /// Address of its report's page, relative to the sweep's folder.
+    /// Path of a file of the view's report, relative to the sweep's folder.
     pub(crate) fn file(&self, name: &str) -> String {
         format!("{}/{name}", self.folder)
     }
 }
 
 impl Sweep {
-    /// Checks that the views' results belong to the sweep's specifications.
+    /// Checks that the results of each view are those of the sweep's specifications.
     pub(crate) fn check(&self) -> Result<(), Error> {
         for view in &self.views {
             let Ok(report) = &view.outcome else { continue };
@@ -103,17 +106,17 @@ impl Sweep {
         Ok(())
     }
 
-    /// Views that have a report, with it.
+    /// The views that have a report, with their reports.
     pub(crate) fn reports(&self) -> impl Iterator<Item = (&SweptView, &Report)> {
         self.views.iter().filter_map(|v| Some((v, v.outcome.as_ref().ok()?)))
     }
 
-    /// Views that have none, and why.
+    /// The views that have no report, with the reasons.
     pub(crate) fn errors(&self) -> impl Iterator<Item = (&SweptView, &str)> {
         self.views.iter().filter_map(|v| Some((v, v.outcome.as_ref().err()?.as_str())))
     }
 
-    /// One a specification, in the sweep's order.
+    /// The means of each specification, in the order of the sweep's specifications.
     pub fn means(&self) -> Vec<Mean> {
         let shadows = self.settings.shadows.iter().enumerate();
         let mean = |(i, shadows): (usize, &String)| {
@@ -135,7 +138,7 @@ impl Sweep {
         shadows.map(mean).collect()
     }
 
-    /// The text of `results.json`: all figures but wall-clock times.
+    /// The text of `results.json`: all figures except wall-clock times.
     ///
     /// # Errors
     /// None for sweeps that this crate's types can hold.
@@ -165,8 +168,8 @@ impl Sweep {
         Ok(serde_json::to_string_pretty(&json)? + "\n")
     }
 
-    /// The text of `results.csv`: a row for each view and specification; a view that failed has one row
-    /// with its error.
+    /// The text of `results.csv`, with a row for each view and specification. A view that failed
+    /// has a single row with its error.
     ///
     /// # Errors
     /// None for sweeps that this crate's types can hold.
@@ -198,7 +201,7 @@ impl Sweep {
     }
 }
 
-/// The columns of `results.csv` behind the view's own.
+/// The columns of `results.csv` that follow the columns of the view.
 type CsvColumn = (&'static str, fn(&Measured) -> String);
 const CSV: [CsvColumn; 18] = [
     ("shadows", |r| r.shadows.clone()),
@@ -221,7 +224,7 @@ const CSV: [CsvColumn; 18] = [
     ("error", |_| String::new()),
 ];
 
-/// The shortest text that reads back as the same number; nothing where there is none.
+/// The shortest text that is read as the same number; empty for `None`.
 fn number(value: Option<f64>) -> String {
     value.filter(|v| v.is_finite()).map(|v| v.to_string()).unwrap_or_default()
 }
@@ -254,7 +257,7 @@ struct ErrorJson<'a> {
     error: &'a str,
 }
 
-/// [`Measured`] without times.
+/// [`Measured`] without its times.
 #[derive(Serialize)]
 struct ResultJson<'a> {
     shadows: &'a str,
@@ -273,7 +276,8 @@ struct ResultJson<'a> {
 
 impl<'a> From<&'a Measured> for ResultJson<'a> {
     fn from(measured: &'a Measured) -> Self {
-        // Sweeps stand still, and their tables tell no times.
+        // The views of a sweep do not move, so there is neither flicker nor noise, and times are
+        // left out.
         let Measured {
             shadows,
             technique: _,
@@ -305,7 +309,8 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
     }
 }
 
-/// Geometric mean of a figure over views, and how many of them had to be raised to one wrong pixel.
+/// Geometric mean of a figure over views, and the number of views whose figure was raised to one
+/// wrong pixel.
 fn geometric_mean(
     counted: &[&Metrics],
     figure: impl Fn(&Metrics) -> Option<f64>,
@@ -326,7 +331,8 @@ pub(crate) mod tests {
     use crate::report::tests::report;
     use serde_json::{Value, json};
 
-    /// A sweep whose views have results of the given shares of wrong pixels; `None`: a view that failed.
+    /// A sweep over one view for each item: the shares of wrong pixels of its results, or `None`
+    /// for a view that failed.
     pub(crate) fn sweep(views: &[Option<&[Option<f64>]>]) -> Sweep {
         let n = views.iter().flatten().map(|v| v.len()).max().unwrap_or(0);
         let view = |(i, wrong): (usize, &Option<&[Option<f64>]>)| SweptView {
@@ -366,7 +372,7 @@ pub(crate) mod tests {
         near(means[0].wrong_fraction, 0.2);
         near(means[0].mean_abs_error, 0.2);
         assert_eq!(means[0].wrong_fraction_raised, 0);
-        // Nothing wrong counts as one wrong pixel of the thousand that were counted.
+        // No wrong pixel counts as one wrong pixel of the thousand counted pixels.
         near(means[1].wrong_fraction, (0.02_f64 * 0.001).sqrt());
         assert_eq!(means[1].wrong_fraction_raised, 1);
         assert_eq!(means[1].mean_abs_error_raised, 1);

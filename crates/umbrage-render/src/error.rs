@@ -1,33 +1,33 @@
-/// Why there is no picture.
+/// Why a picture could not be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No adapter answers, or none of that name.
+    /// No adapter was found, or none with the requested name. Holds the reason.
     #[error("no GPU answers: {0}")]
     NoAdapter(String),
-    /// The adapter gives no device.
+    /// The adapter cannot provide a suitable device.
     #[error("{adapter}: {problem}")]
     NoDevice {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// What it says.
+        /// What is missing, or the adapter's message.
         problem: String,
     },
-    /// The device was lost at work.
+    /// The device was lost during work. Holds the device's message.
     #[error("the GPU was lost: {0}")]
     Lost(String),
-    /// The device refused something, such as memory.
+    /// The device refused a request, for example for memory. Holds the device's message.
     #[error("the GPU refused: {0}")]
     Refused(String),
-    /// Something of the scene or picture is too large for the device.
+    /// A part of the scene or the picture is too large for the device.
     #[error("{what} is too large for this GPU: {problem}")]
     TooLarge {
-        /// What it is.
+        /// The part that is too large.
         what: String,
-        /// What is possible.
+        /// The limit that it exceeds.
         problem: String,
     },
-    /// There are no shadows.
+    /// An error of [`umbrage_wgpu`].
     #[error(transparent)]
     Shadows(#[from] umbrage_wgpu::Error),
 }

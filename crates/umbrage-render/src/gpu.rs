@@ -8,7 +8,7 @@ use wgpu::{
     MemoryHints, PollType, Queue, TextureUsages, Trace,
 };
 
-/// A device without a window.
+/// A GPU device without a window.
 pub struct Gpu {
     device: Device,
     queue: Queue,
@@ -17,31 +17,31 @@ pub struct Gpu {
     trouble: Arc<Mutex<Trouble>>,
 }
 
-/// What went wrong on the device since it was last asked.
+/// Errors of the device since the last check.
 #[derive(Default)]
 struct Trouble {
     lost: Option<String>,
     refused: Option<String>,
 }
 
-/// What can be had for faster or fuller work, but is not needed.
+/// Features that make work faster or more complete, and are not required.
 const WANTED: Features = Support::WANTED_FEATURES
     .union(Features::TIMESTAMP_QUERY)
     .union(Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
-/// An adapter, and what it can do.
+/// An adapter, with what it supports.
 #[derive(Clone, Debug)]
 pub struct AdapterReport {
-    /// Name, kind, driver and backend.
+    /// Name, type, driver and backend of the adapter.
     pub info: AdapterInfo,
-    /// What shadows get from it, or what it lacks.
+    /// How the adapter supports shadows, or what it lacks for them.
     pub support: Result<Support, Error>,
-    /// Whether it tells how long its passes take.
+    /// Whether the adapter can measure the time of its passes.
     pub has_timestamps: bool,
 }
 
 impl AdapterReport {
-    /// Whether it is a program that does a GPU's work.
+    /// Whether the adapter is a software implementation that runs on the CPU.
     pub fn is_software(&self) -> bool {
         is_software(&self.info)
     }
@@ -51,10 +51,11 @@ fn is_software(info: &AdapterInfo) -> bool {
     info.device_type == DeviceType::Cpu
 }
 
-/// All adapters, the best first: real GPUs before software.
+/// All adapters, the best first: hardware before software.
 fn adapters() -> Vec<Adapter> {
     let backends = Backends::from_env().unwrap_or(Backends::all());
-    // OpenGL is the last resort, and looking for it alone makes some drivers print.
+    // OpenGL is only tried if there is nothing else, because some drivers print messages when it is
+    // looked for.
     let primary = adapters_of(backends & Backends::PRIMARY);
     if primary.is_empty() { adapters_of(backends & Backends::SECONDARY) } else { primary }
 }
@@ -76,7 +77,7 @@ fn adapters_of(backends: Backends) -> Vec<Adapter> {
     adapters
 }
 
-/// What every adapter can do, the best first. Opens each for a moment.
+/// Reports on all adapters, the best first. Each adapter is opened for a moment.
 pub fn devices() -> Vec<AdapterReport> {
     let report = |adapter: Adapter| {
         let opened = open(&adapter);
@@ -105,7 +106,8 @@ fn open(adapter: &Adapter) -> Result<(Device, Queue), Error> {
         .map_err(|e| Error::NoDevice { adapter: adapter.get_info().name, problem: e.to_string() })
 }
 
-/// That it can draw what samples are read back from, which WebGPU guarantees but OpenGL does not have.
+/// Checks that the adapter can render to the format that samples are read back from. WebGPU
+/// guarantees this format, but OpenGL may lack it.
 fn check_renderer(adapter: &Adapter) -> Result<(), Error> {
     let features = adapter.get_texture_format_features(SAMPLE_FORMAT);
     if features.allowed_usages.contains(TextureUsages::RENDER_ATTACHMENT) {
@@ -113,16 +115,18 @@ fn check_renderer(adapter: &Adapter) -> Result<(), Error> {
     }
     Err(Error::NoDevice {
         adapter: adapter.get_info().name,
-        problem: "it cannot draw floats of 32 bits, which pictures are measured by".into(),
+        problem: "it cannot render to textures of 32-bit floats, from which samples are read back"
+            .into(),
     })
 }
 
 impl Gpu {
-    /// The best adapter that can do what is needed. The environment's `WGPU_ADAPTER_NAME` picks one by a part of its name,
-    /// `WGPU_BACKEND` by its kind (`vulkan`, `metal`, `dx12`, `gl`).
+    /// Opens the best adapter that is suitable. The environment variable `WGPU_ADAPTER_NAME`
+    /// selects an adapter by a part of its name, and `WGPU_BACKEND` by its backend (`vulkan`,
+    /// `metal`, `dx12`, `gl`).
     ///
     /// # Errors
-    /// If there is none.
+    /// There is no suitable adapter.
     pub fn open() -> Result<Self, Error> {
         let wanted = std::env::var("WGPU_ADAPTER_NAME").ok().map(|n| n.to_lowercase());
         let is_wanted = |a: &Adapter| {
@@ -157,48 +161,48 @@ impl Gpu {
         Ok(Self { device, queue, info: adapter.get_info(), support, trouble })
     }
 
-    /// The device.
+    /// The wgpu device.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Its queue.
+    /// The queue of the device.
     pub fn queue(&self) -> &Queue {
         &self.queue
     }
 
-    /// What shadows get from it.
+    /// How the device supports shadows.
     pub fn support(&self) -> Support {
         self.support
     }
 
-    /// Name, kind, driver and backend.
+    /// Name, type, driver and backend of the adapter.
     pub fn info(&self) -> &AdapterInfo {
         &self.info
     }
 
-    /// Whether it is a program that does a GPU's work.
+    /// Whether the adapter is a software implementation that runs on the CPU.
     pub fn is_software(&self) -> bool {
         is_software(&self.info)
     }
 
-    /// Waits until all that was submitted is done.
+    /// Waits until all submitted work is done.
     ///
     /// # Errors
-    /// What went wrong on the device since it was last asked: its loss, or something that it refused.
+    /// The device was lost, or refused something, since the last check.
     pub fn wait(&self) -> Result<(), Error> {
-        // What goes wrong in waiting is told to the callbacks as well, and in more words.
+        // The callbacks also receive the errors of this wait, with better messages.
         let polled = self.device.poll(PollType::wait_indefinitely());
         self.check()?;
         polled.map(drop).map_err(|e| Error::Lost(e.to_string()))
     }
 
-    /// A buffer that holds this, a multiple of four bytes. Written through the queue, for mapping panics on a device
-    /// that was lost.
+    /// Makes a buffer with these contents, whose length is a multiple of four bytes. The queue
+    /// writes them, because mapping a buffer panics if the device was lost.
     pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
         let buffer = self.device.create_buffer(&BufferDescriptor {
             label: Some(label),
-            // Buffers of no size cannot be bound.
+            // Buffers of size 0 cannot be bound.
             size: contents.len().max(16) as u64,
             usage: usage | BufferUsages::COPY_DST,
             mapped_at_creation: false,
@@ -207,9 +211,9 @@ impl Gpu {
         buffer
     }
 
-    /// What is in a buffer that can be mapped, once all that was submitted is done.
+    /// The contents of a mappable buffer, after all submitted work is done.
     pub(crate) fn read<T: bytemuck::Pod>(&self, buffer: &Buffer) -> Result<Vec<T>, Error> {
-        // The callback tells nothing that waiting does not.
+        // The callback reports no error that the wait does not report.
         buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         self.wait()?;
         let bytes = buffer.get_mapped_range(..).map_err(|e| Error::Lost(e.to_string()))?;
@@ -219,10 +223,10 @@ impl Gpu {
         Ok(values)
     }
 
-    /// Tells what went wrong on the device since it was last asked.
+    /// Checks whether an error occurred on the device since the last check.
     ///
     /// # Errors
-    /// That.
+    /// The device was lost, or refused something.
     pub fn check(&self) -> Result<(), Error> {
         let mut trouble = lock(&self.trouble);
         if let Some(message) = &trouble.lost {
@@ -238,6 +242,6 @@ impl Gpu {
 }
 
 fn lock(trouble: &Mutex<Trouble>) -> std::sync::MutexGuard<'_, Trouble> {
-    // Whoever panicked did so after writing: there is nothing half done.
+    // A thread that panicked did so after writing, so the data is complete.
     trouble.lock().unwrap_or_else(PoisonError::into_inner)
 }

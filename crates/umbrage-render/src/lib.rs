@@ -1,9 +1,10 @@
-//! A small forward renderer for Umbrage's scenes: textures, sun or lamp, sky, tone mapping, and shadows by
-//! [`umbrage_wgpu`], whose public API is all that it knows of them.
+//! A small forward renderer for Umbrage's scenes, with textures, one light, a sky and tone mapping.
+//! Its shadows come from [`umbrage_wgpu`], of which it uses only the public API.
 //!
-//! - [`Gpu`] is a device without a window; [`devices`] tells of all there are.
-//! - [`SceneBuffers`] are a scene's meshes and materials on it.
-//! - [`Renderer`] draws a plan's maps, then [frames](Renderer::frame) to look at or [samples](Renderer::samples) to measure.
+//! - [`Gpu`] is a device without a window; [`devices`] reports on all adapters.
+//! - [`SceneBuffers`] hold the meshes and materials of a scene on the device.
+//! - [`Renderer`] draws the maps of a plan, and then [frames](Renderer::frame) to display or
+//!   [samples](Renderer::samples) to measure.
 
 mod error;
 mod gpu;
@@ -20,3 +21,9 @@ pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
 pub use timer::Timer;
+
+/// The README's examples are tests. They are here, because this crate stays in the repository: the
+/// crates that they are about are also published, where there is no such file.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -1,4 +1,4 @@
-//! Lookups at any points, without a picture.
+//! Looks up visibility at arbitrary points, without drawing a picture.
 
 use crate::renderer::Renderer;
 use crate::{Error, Gpu};
@@ -13,7 +13,7 @@ use wgpu::{
     PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
-/// `Point` in `wgsl/points.wgsl`.
+/// The struct `Point` of `wgsl/points.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct Point {
@@ -23,10 +23,10 @@ struct Point {
     padding: u32,
 }
 
-/// Points looked up at a time: as many as one dispatch of a guaranteed size takes.
+/// Number of points per dispatch: as many as a dispatch of guaranteed size can have.
 const BATCH: usize = 64 * 65535;
 
-/// Looks points up.
+/// The compute pipeline that looks up visibility at points.
 pub(crate) struct Points {
     pipeline: ComputePipeline,
     layout: BindGroupLayout,
@@ -72,11 +72,12 @@ impl Points {
 }
 
 impl Renderer<'_, '_> {
-    /// How much of one of a plan's lights its maps let through to surface points, each a position and the triangle's
-    /// normal, world space. The plan's maps must be drawn.
+    /// Visibility, in [0, 1], of surface points under one of the plan's lights, as its maps have
+    /// it. Each point is a position and the normal of its triangle, both in world space. The plan's
+    /// maps must have been drawn.
     ///
     /// # Errors
-    /// What the device refuses, or its loss.
+    /// The device refused something or was lost.
     pub fn visibility(
         &mut self,
         plan: &Plan,

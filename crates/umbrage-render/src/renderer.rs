@@ -33,53 +33,53 @@ pub struct Renderer<'g, 's> {
     pub(crate) points: Option<Points>,
     opaque: MeshCasters,
     masked: MeshCasters,
-    /// One a material; `None` for opaque ones.
+    /// One for each material; `None` for opaque materials.
     masks: Vec<Option<BindGroup>>,
     view_buffer: Buffer,
     view_group: BindGroup,
     shader: ShaderModule,
     layout: PipelineLayout,
-    /// By the names of their fragment shaders; made when they are first used.
+    /// Pipelines by the names of their fragment shaders, made at first use.
     pictures: HashMap<&'static str, [RenderPipeline; 2]>,
     instances: Instances,
     eye: DVec3,
 }
 
-/// Who looks on, in which light.
+/// A camera and a light to shade a picture with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading<'a> {
-    /// The viewer that the maps were planned for.
+    /// The camera that the maps were planned for.
     pub camera: &'a Camera,
     /// One of the plan's lights.
     pub light: &'a Light,
-    /// Its index in the plan.
+    /// The light's index in the plan.
     pub light_index: u32,
 }
 
-/// What was drawn into a map or picture.
+/// What was drawn into a map or a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drawn {
-    /// Draw calls.
+    /// Number of draw calls.
     pub draws: u32,
-    /// Triangles, each instance's counted.
+    /// Number of triangles, counted once for each instance.
     pub triangles: u64,
 }
 
-/// Instances to draw, list after list.
+/// Lists of instances to draw, one after the other.
 struct Instances {
     list: Vec<CasterInstance>,
     draws: Vec<Draw>,
     buffer: Buffer,
 }
 
-/// Some instances of one mesh.
+/// A draw call: several instances of one mesh.
 #[derive(Clone, Debug)]
 struct Draw {
     mesh: usize,
     instances: Range<u32>,
 }
 
-/// A range of draws, one a map or for a picture.
+/// A range of draws: those of a map, or those of the picture.
 type DrawList = Range<usize>;
 
 impl Instances {
@@ -88,7 +88,7 @@ impl Instances {
         self.draws.clear();
     }
 
-    /// Adds all instances that `is_drawn` says, those of one mesh in one draw.
+    /// Adds all instances for which `is_drawn` is true, with one draw for those of one mesh.
     fn add(
         &mut self,
         scene: &SceneBuffers<'_>,
@@ -114,11 +114,8 @@ impl Instances {
             let max = gpu.device().limits().max_buffer_size;
             if bytes.len() as u64 > max {
                 return Err(Error::TooLarge {
-                    what: format!(
-                        "the scene's {} instances, in all maps together,",
-                        self.list.len()
-                    ),
-                    problem: format!("a buffer takes {max} bytes"),
+                    what: format!("the list of {} instances to draw", self.list.len()),
+                    problem: format!("a buffer holds at most {max} bytes"),
                 });
             }
             self.buffer = instance_buffer(gpu, (bytes.len() as u64).next_power_of_two().min(max));
@@ -164,15 +161,15 @@ const ATTRIBUTES: VertexBufferLayout<'static> = VertexBufferLayout {
     ],
 };
 
-/// What masked casters need of them.
+/// The attributes that masked casters need.
 const UVS: VertexBufferLayout<'static> =
     VertexBufferLayout { attributes: ATTRIBUTES.attributes.split_at(1).0, ..ATTRIBUTES };
 
 impl<'g, 's> Renderer<'g, 's> {
-    /// A renderer whose shadow maps are looked up as `options` say.
+    /// Makes a renderer that looks up its shadow maps according to `options`.
     ///
     /// # Errors
-    /// A device that cannot do so.
+    /// The device does not support the options.
     pub fn new(
         gpu: &'g Gpu,
         scene: &'g SceneBuffers<'s>,
@@ -181,7 +178,8 @@ impl<'g, 's> Renderer<'g, 's> {
         Self::with_support(gpu, scene, options, gpu.support())
     }
 
-    /// The same on a device that is said to do less than it can.
+    /// Like [`new`](Self::new), but uses only what `support` says of the device, which may be less
+    /// than the device supports.
     ///
     /// # Errors
     /// As for [`new`](Self::new).
@@ -220,30 +218,7 @@ impl<'g, 's> Renderer<'g, 's> {
             )
         });
         let masks = masks.collect();
-        let view_buffer = device.create_buffer(&BufferDescriptor {
-            label: Some("view"),
-            size: size_of::<ViewUniform>() as u64,
-            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let view_layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
-            label: Some("view"),
-            entries: &[BindGroupLayoutEntry {
-                binding: 0,
-                visibility: ShaderStages::VERTEX_FRAGMENT,
-                ty: BindingType::Buffer {
-                    ty: BufferBindingType::Uniform,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            }],
-        });
-        let view_group = device.create_bind_group(&BindGroupDescriptor {
-            label: Some("view"),
-            layout: &view_layout,
-            entries: &[BindGroupEntry { binding: 0, resource: view_buffer.as_entire_binding() }],
-        });
+        let (view_buffer, view_layout, view_group) = view_bindings(device);
         let shader = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("forward"),
             source: ShaderSource::Wgsl(shader_text(&shadows).into()),
@@ -278,16 +253,16 @@ impl<'g, 's> Renderer<'g, 's> {
         })
     }
 
-    /// The maps.
+    /// The shadow maps, as `umbrage_wgpu` holds them.
     pub fn shadows(&self) -> &Shadows {
         &self.shadows
     }
 
-    /// Draws those of the plan's maps that are not as they should be, and waits for nothing. Returns what was drawn into
-    /// which: indices in the plan.
+    /// Draws those of the plan's maps that are out of date, without waiting for the device. Returns
+    /// what was drawn into which map, by the map's index in the plan.
     ///
     /// # Errors
-    /// Maps that this device cannot hold or draw.
+    /// The device cannot hold or draw the maps.
     pub fn draw_maps(
         &mut self,
         plan: &Plan,
@@ -341,11 +316,11 @@ impl<'g, 's> Renderer<'g, 's> {
         Ok(drawn)
     }
 
-    /// Draws a frame to look at into a target as large as the camera's picture, and waits for nothing. The maps must be
-    /// drawn.
+    /// Draws a frame to display into a target of the size of the camera's picture, without waiting
+    /// for the device. The maps must have been drawn.
     ///
     /// # Errors
-    /// What the device refuses.
+    /// The device refused something.
     pub fn frame(
         &mut self,
         shading: &Shading<'_>,
@@ -366,7 +341,7 @@ impl<'g, 's> Renderer<'g, 's> {
         Ok(drawn)
     }
 
-    /// Pipelines whose fragment shaders are `mesh_NAME` and `sky_NAME`.
+    /// The pipelines for meshes and sky, with the fragment shaders `mesh_NAME` and `sky_NAME`.
     pub(crate) fn pipelines(
         &mut self,
         name: &'static str,
@@ -377,7 +352,8 @@ impl<'g, 's> Renderer<'g, 's> {
         pictures.entry(name).or_insert_with(made).clone()
     }
 
-    /// Draws the scene and the sky. One picture a submission, as they share buffers.
+    /// Draws the scene and the sky. Each picture needs a submission of its own, because pictures
+    /// share buffers.
     pub(crate) fn encode_picture(
         &mut self,
         encoder: &mut CommandEncoder,
@@ -434,10 +410,39 @@ impl<'g, 's> Renderer<'g, 's> {
     }
 }
 
-/// Format of frames to look at.
+/// The uniform buffer for camera and light, with its bind group and the layout of that.
+fn view_bindings(device: &wgpu::Device) -> (Buffer, wgpu::BindGroupLayout, BindGroup) {
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("view"),
+        size: size_of::<ViewUniform>() as u64,
+        usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+        label: Some("view"),
+        entries: &[BindGroupLayoutEntry {
+            binding: 0,
+            visibility: ShaderStages::VERTEX_FRAGMENT,
+            ty: BindingType::Buffer {
+                ty: BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        }],
+    });
+    let group = device.create_bind_group(&BindGroupDescriptor {
+        label: Some("view"),
+        layout: &layout,
+        entries: &[BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+    });
+    (buffer, layout, group)
+}
+
+/// Texture format of the frames to display.
 pub const FRAME_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 
-/// What frames are drawn into.
+/// The textures that frames are drawn into.
 pub struct FrameTarget {
     color: Texture,
     color_view: TextureView,
@@ -445,16 +450,16 @@ pub struct FrameTarget {
 }
 
 impl FrameTarget {
-    /// A target of this many pixels.
+    /// Makes a target of this width and height, pixels.
     ///
     /// # Errors
-    /// More than the device's textures have.
+    /// The target is larger than the device's largest texture.
     pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self, Error> {
         let max = gpu.device().limits().max_texture_dimension_2d;
         if width > max || height > max {
             return Err(Error::TooLarge {
                 what: format!("a frame of {width}x{height} pixels"),
-                problem: format!("at most {max} each way"),
+                problem: format!("at most {max} pixels in width and height"),
             });
         }
         let texture = |format, usage| {
@@ -476,21 +481,21 @@ impl FrameTarget {
         Ok(Self { color_view: view(&color), color, depth })
     }
 
-    /// The picture: sRGB, of [`FRAME_FORMAT`].
+    /// The picture, in sRGB with the format [`FRAME_FORMAT`].
     pub fn color(&self) -> &Texture {
         &self.color
     }
 }
 
-/// Where a picture goes, and how.
+/// The textures that a picture is drawn into, and the pipelines that draw it.
 pub(crate) struct Target<'a> {
     pub(crate) color: &'a [&'a TextureView],
     pub(crate) depth: &'a TextureView,
-    /// For meshes and for the sky.
+    /// The pipeline for meshes, and the one for the sky.
     pub(crate) pipelines: &'a [RenderPipeline; 2],
 }
 
-/// Draws meshes into a pass, with vertex buffers set once.
+/// Draws meshes into a pass. The vertex buffers are set once.
 struct Drawer<'a, 'p, 'e> {
     scene: &'a SceneBuffers<'a>,
     pass: &'p mut RenderPass<'e>,
@@ -512,7 +517,7 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
         Self { scene, pass, drawn, chosen: None }
     }
 
-    /// Sets a pipeline where another was used last.
+    /// Sets a pipeline if another one was used last.
     fn choose(&mut self, which: usize, set: impl FnOnce(&mut RenderPass<'_>)) {
         if self.chosen != Some(which) {
             set(self.pass);
@@ -528,7 +533,7 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
     }
 }
 
-/// The forward shader, behind the lookup module that it calls.
+/// The forward shader, after the lookup module that it calls.
 fn shader_text(shadows: &Shadows) -> String {
     shadows.lookup_wgsl(1) + "\n" + include_str!("wgsl/forward.wgsl")
 }
@@ -553,7 +558,7 @@ fn pipelines(
                 compilation_options: PipelineCompilationOptions::default(),
                 buffers,
             },
-            // Both sides of every surface show.
+            // Both sides of every surface are visible.
             primitive: PrimitiveState::default(),
             depth_stencil: Some(DepthStencilState {
                 format: DEPTH_FORMAT,

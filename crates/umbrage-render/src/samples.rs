@@ -1,4 +1,4 @@
-//! What a picture's samples show, read back to be measured.
+//! Samples of a picture, read back from the GPU to be measured.
 
 use crate::renderer::{Renderer, Shading, Target};
 use crate::view::Tile;
@@ -12,39 +12,41 @@ use wgpu::{
     TextureFormat, TextureUsages, TextureViewDescriptor,
 };
 
-/// What the GPU says of a point of a picture.
+/// The values of the GPU at a point of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Linear colour.
     pub radiance: Vec3,
-    /// How much of the light reaches the surface by the shadow maps, 0 to 1; 0 where it faces away, 1 in the sky.
+    /// Visibility by the shadow maps, from 0 to 1: 0 where the surface faces away from the light, 1
+    /// in the sky.
     pub visibility: f32,
-    /// Whether a surface is seen that faces the light and is within its reach.
+    /// Whether the sample shows a surface that faces the light and is within the light's reach.
     pub is_facing: bool,
-    /// Distance along the view, metres; infinite in the sky.
+    /// Distance along the view direction, metres; infinite in the sky.
     pub depth: f32,
-    /// Shading normal, world space; zero in the sky.
+    /// Shading normal in world space; zero in the sky.
     pub normal: Vec3,
-    /// Index in the plan of the map that serves the point.
+    /// Index in the plan of the map that serves the point; `None` if no map does.
     pub map: Option<u32>,
-    /// Texel coordinates in that map; NaN without one.
+    /// Texel coordinates in that map; NaN without a map.
     pub texel: Vec2,
     /// Pixels per texel on the surface, in the worst direction; NaN without a map.
     pub error: f32,
 }
 
-/// Format of what is read back.
+/// Texture format of the samples that are read back.
 pub(crate) const SAMPLE_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
-/// The longest side of a tile, samples: 32 MB each of three layers.
+/// Largest width and height of a tile, samples: each of its three layers takes up to 16 MiB.
 const TILE: u32 = 1024;
 
 impl Renderer<'_, '_> {
-    /// All samples of some of a picture's rows, pixel by pixel from the left and row by row, `grid` × `grid` in each pixel
-    /// (row by row as well), on a regular grid. The maps must be drawn. `wants_texels`: texels, maps and errors are needed.
+    /// Samples of some of a picture's rows, row by row and pixel by pixel from the left. Each pixel
+    /// has a regular grid of `grid` × `grid` samples, also row by row. The maps must have been
+    /// drawn. Maps, texels and errors are only computed if `wants_texels` is true.
     ///
     /// # Errors
-    /// What the device refuses, or its loss.
+    /// The device refused something or was lost.
     pub fn samples(
         &mut self,
         shading: &Shading<'_>,
@@ -96,7 +98,7 @@ impl Sample {
     }
 }
 
-/// Textures that a tile is drawn into, and a buffer that all are read back through.
+/// The textures that a tile is drawn into, and a buffer through which all are read back.
 struct Layers {
     color: [Texture; 2],
     depth: Texture,
@@ -146,7 +148,7 @@ impl Layers {
     ) -> Result<Vec<Sample>, Error> {
         let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
         let [first, second, depth] = [&self.color[0], &self.color[1], &self.depth].map(view);
-        // A tile at the picture's edge is drawn into a corner of the textures.
+        // A tile at the edge of the picture is drawn into a corner of the textures.
         let device = renderer.gpu.device();
         let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
         let mut encoder = device.create_command_encoder(&Default::default());

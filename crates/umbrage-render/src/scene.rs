@@ -13,23 +13,23 @@ use wgpu::{
     TextureSampleType, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
-/// A scene's meshes and materials on a GPU.
+/// The meshes and materials of a scene on a GPU.
 pub struct SceneBuffers<'a> {
     scene: &'a Scene,
     pub(crate) positions: Buffer,
     pub(crate) attributes: Buffer,
     pub(crate) indices: Buffer,
-    /// One a mesh.
+    /// One for each mesh.
     pub(crate) meshes: Vec<MeshRange>,
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) material_layout: BindGroupLayout,
-    /// One an instance, world space.
+    /// The box of each instance, world space, metres.
     pub(crate) boxes: Vec<Aabb>,
-    /// Instances, those of one mesh together.
+    /// Indices of the instances, those of one mesh next to each other.
     pub(crate) by_mesh: Vec<usize>,
 }
 
-/// Where a mesh lies in the buffers.
+/// The range of a mesh in the buffers.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshRange {
     pub(crate) indices: std::ops::Range<u32>,
@@ -37,13 +37,13 @@ pub(crate) struct MeshRange {
     pub(crate) material: usize,
 }
 
-/// A material, as meshes with or without texture coordinates have it.
+/// A material, for meshes with or for meshes without texture coordinates.
 pub(crate) struct GpuMaterial {
     pub(crate) bind_group: BindGroup,
     pub(crate) mask: Option<GpuMask>,
 }
 
-/// The alpha of a masked material.
+/// The alpha mask of a material.
 pub(crate) struct GpuMask {
     pub(crate) texture: TextureView,
     pub(crate) sampler: Sampler,
@@ -51,7 +51,8 @@ pub(crate) struct GpuMask {
     pub(crate) cutoff: f32,
 }
 
-/// A vertex but for its position, which shadow maps need alone.
+/// The attributes of a vertex without its position, which has a buffer of its own because opaque
+/// casters need nothing else.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Attributes {
@@ -68,10 +69,10 @@ struct MaterialUniform {
 }
 
 impl<'a> SceneBuffers<'a> {
-    /// Uploads a scene. `opaque`: alpha masks are ignored.
+    /// Uploads a scene. If `opaque` is true, alpha masks are ignored.
     ///
     /// # Errors
-    /// A scene or texture that is too large for the device.
+    /// The scene or a texture is too large for the device.
     pub fn new(gpu: &Gpu, scene: &'a Scene, opaque: bool) -> Result<Self, Error> {
         let device = gpu.device();
         let limits = device.limits();
@@ -82,7 +83,7 @@ impl<'a> SceneBuffers<'a> {
         if bytes > largest {
             return Err(Error::TooLarge {
                 what: "the scene".into(),
-                problem: format!("{bytes} bytes in a buffer, of which it takes {largest}"),
+                problem: format!("{bytes} bytes, but a buffer holds at most {largest}"),
             });
         }
         for (i, texture) in scene.textures.iter().enumerate() {
@@ -90,7 +91,7 @@ impl<'a> SceneBuffers<'a> {
             if texture.size.iter().any(|&n| n > max) {
                 return Err(Error::TooLarge {
                     what: format!("texture {i} of {}x{} pixels", texture.size[0], texture.size[1]),
-                    problem: format!("at most {max} each way"),
+                    problem: format!("at most {max} pixels in width and height"),
                 });
             }
         }
@@ -157,7 +158,7 @@ fn attributes(mesh: &Mesh) -> impl Iterator<Item = Attributes> {
     })
 }
 
-/// Materials as they are met.
+/// Collects the materials in the order in which meshes use them.
 struct Materials<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
@@ -240,7 +241,7 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// A texture without pixels is opaque white.
+/// Uploads a texture. A texture without pixels becomes opaque white.
 fn upload(gpu: &Gpu, texture: &Texture) -> TextureView {
     let is_whole = texture.rgba.len() as u64
         == u64::from(texture.size[0]) * u64::from(texture.size[1])

@@ -1,4 +1,4 @@
-//! How long stages take on the GPU, by timestamp queries.
+//! Measures the time of the stages on the GPU, by timestamp queries.
 
 use crate::{Error, Gpu};
 use umbrage_wgpu::Timestamps;
@@ -18,7 +18,7 @@ const COUNT: u32 = 6;
 const BYTES: u64 = 8 * COUNT as u64;
 
 impl Timer {
-    /// `None` on devices without timestamps.
+    /// Makes a timer; `None` if the device has no timestamps.
     pub fn new(gpu: &Gpu) -> Option<Self> {
         if !gpu.device().features().contains(Features::TIMESTAMP_QUERY) {
             return None;
@@ -63,11 +63,12 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
     }
 
-    /// Milliseconds that the last frame's depth passes, filters and picture took on the GPU, after waiting for it. Passes that
-    /// there were not keep the time of the last frame that had some.
+    /// Waits for the last frame and returns the times that its depth passes, filter passes and
+    /// picture took on the GPU, milliseconds. If a frame has no passes of a kind, their time is
+    /// that of the last frame that had some.
     ///
     /// # Errors
-    /// The device's loss.
+    /// The device was lost.
     pub fn read(&self, gpu: &Gpu) -> Result<[f64; 3], Error> {
         let ticks: Vec<u64> = gpu.read(&self.readback)?;
         let ms = f64::from(gpu.queue().get_timestamp_period()) * 1e-6;

@@ -1,11 +1,11 @@
-//! What the forward shader knows of viewer and light.
+//! The uniform with camera and light for the forward shader.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec3, Vec4};
 use umbrage::{Camera, Light, Plane};
 use umbrage_scene::daylight;
 
-/// `View` in `wgsl/forward.wgsl`.
+/// The struct `View` of `wgsl/forward.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ViewUniform {
@@ -31,7 +31,8 @@ pub(crate) struct ViewUniform {
     pub(crate) glow: Vec4,
 }
 
-/// A part of a picture: a rectangle of samples, of which there are `grid` along each side of a pixel.
+/// A rectangular part of a picture, in samples. There are `grid` samples along each side of a
+/// pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Tile {
     pub(crate) origin: [u32; 2],
@@ -40,18 +41,19 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
-    /// All of a picture, one sample a pixel.
+    /// The whole picture, with one sample per pixel.
     pub(crate) fn whole(camera: &Camera) -> Self {
         Self { origin: [0, 0], size: camera.image(), grid: 1 }
     }
 
-    /// Position in the picture, pixels, of a point of the tile, samples.
+    /// Position in the picture, in pixels, of a point of the tile, which is in samples.
     fn pixel(&self, x: f64, y: f64) -> DVec2 {
         let [left, top] = self.origin.map(f64::from);
         DVec2::new(left + x, top + y) / f64::from(self.grid)
     }
 
-    /// Rays of unit depth through the tile's upper left corner, and their steps to the right and down.
+    /// The ray of unit depth through the upper left corner of the tile, and its change per sample
+    /// to the right and downwards.
     fn rays(&self, camera: &Camera) -> [DVec3; 3] {
         let corner = camera.ray(self.pixel(0.0, 0.0));
         let step = |x, y| (camera.ray(self.pixel(x, y)) - corner) / (x + y);
@@ -59,7 +61,7 @@ impl Tile {
         [corner, step(width, 0.0), step(0.0, height)]
     }
 
-    /// World-space planes around all that may show in the tile.
+    /// World-space planes around all that can be visible in the tile.
     pub(crate) fn planes(&self, camera: &Camera) -> [Plane; 5] {
         let [w, h] = self.size.map(f64::from);
         let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
@@ -76,18 +78,20 @@ impl Tile {
 }
 
 impl ViewUniform {
-    /// Render space is relative to the eye.
+    /// The uniform for a tile. Render space is relative to the eye.
     pub(crate) fn new(camera: &Camera, light: &Light, light_index: u32, tile: &Tile) -> Self {
         let [ray, ray_x, ray_y] = tile.rays(camera);
         let forward = camera.forward();
         let [width, height] = tile.size.map(f64::from);
-        // A point p is depth · (ray + x ray_x + y ray_y): solve for x and y. The steps are perpendicular.
+        // A point p is depth · (ray + x ray_x + y ray_y), which is solved here for x and y. The
+        // steps are perpendicular to each other.
         let across = |step: DVec3, n: f64, sign: f64| {
             let per_depth = step / step.length_squared();
             let sample = per_depth - forward * per_depth.dot(ray);
             (sample * (2.0 / n) - forward) * sign
         };
-        // Depth is reversed, its far plane infinitely far: what is nearer than the near distance is clipped.
+        // Depth is reversed and the far plane infinitely far. Surfaces nearer than the near
+        // distance are clipped.
         let rows = [
             across(ray_x, width, 1.0).extend(0.0),
             across(ray_y, height, -1.0).extend(0.0),

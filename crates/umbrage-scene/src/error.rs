@@ -1,23 +1,23 @@
 use std::path::PathBuf;
 
-/// Why there is no scene.
+/// Why a scene could not be loaded or built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A file could not be read.
     #[error("{}: {source}", .path.display())]
     Read {
-        /// The scene, or the buffer or image it refers to.
+        /// Path of the scene, or of the buffer or image that the scene refers to.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file breaks a rule of glTF 2.0 that has no safe repair.
     #[error("{}: {place}: {problem}", .path.display())]
     Invalid {
-        /// The scene file.
+        /// Path of the scene file.
         path: PathBuf,
-        /// Where in it, as a JSON path such as `meshes[3].primitives[0].indices`.
+        /// Place in the file, as a JSON path such as `meshes[3].primitives[0].indices`.
         place: String,
         /// What is wrong there, and what would be right.
         problem: String,
@@ -25,19 +25,19 @@ pub enum SceneError {
     /// No built-in scene has this name.
     #[error("no built-in scene is called {name:?}; did you mean {nearest:?}?")]
     UnknownBuiltin {
-        /// As asked for.
+        /// The requested name.
         name: String,
-        /// The name most like it.
+        /// The valid name that is most similar to it.
         nearest: &'static str,
     },
-    /// A built-in scene of this size would be empty or too large.
+    /// The requested size of a built-in scene is out of range.
     #[error("size: {name:?} comes in sizes 1 to {max}, not {size}")]
     BuiltinSize {
-        /// The scene.
+        /// Name of the scene.
         name: &'static str,
-        /// As asked for.
+        /// The requested size.
         size: u32,
-        /// The largest that can be built.
+        /// The largest valid size; the smallest is 1.
         max: u32,
     },
 }

@@ -1,8 +1,8 @@
-//! Scenes for shadow experiments: glTF files and built-in procedural worlds, as triangles,
-//! materials, cameras and lights.
+//! Scenes for shadow experiments, from glTF files or built in: triangles, materials, cameras and
+//! lights.
 //!
-//! World space is right-handed, +y up, metres. Meshes are stored once, in single precision and
-//! their own space, and drawn by [`Instance`]s with double-precision transforms.
+//! World space is right-handed, +y up, in metres. Each mesh is stored once, in single precision and
+//! in its own space. [`Instance`]s draw it with transforms in double precision.
 
 mod builtin;
 pub mod daylight;

@@ -2,7 +2,7 @@ use crate::types::{Texture, Wrap};
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::LazyLock;
 
-/// sRGB decoded to linear light (IEC 61966-2-1).
+/// Linear light for each value of an 8-bit sRGB channel (IEC 61966-2-1).
 static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|i| {
         let c = i as f32 / 255.0;
@@ -11,10 +11,10 @@ static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
 });
 
 impl Texture {
-    /// Linear red, green, blue and straight alpha at texture coordinates `uv`, bilinearly between
-    /// pixel centres. (0, 0) is the upper left corner of the image, as in glTF.
+    /// Linear red, green, blue and straight alpha at texture coordinates `uv`, interpolated
+    /// bilinearly between pixel centres. (0, 0) is the upper left corner of the image, as in glTF.
     ///
-    /// Coordinates that are not finite count as 0; a texture without pixels is opaque white.
+    /// Coordinates that are not finite count as 0. A texture without pixels is opaque white.
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         let table = &*LINEAR_FROM_SRGB;
         self.bilinear(uv, Vec4::ONE, |p| {
@@ -23,8 +23,7 @@ impl Texture {
         })
     }
 
-    /// The alpha of [`sample`](Self::sample) alone, for the rays that only ask whether there is
-    /// anything.
+    /// Only the alpha of [`sample`](Self::sample), for shadow rays, which do not need the colour.
     pub fn sample_alpha(&self, uv: Vec2) -> f32 {
         self.bilinear(uv, 1.0, |p| f32::from(p[3]) / 255.0)
     }
@@ -44,10 +43,12 @@ impl Texture {
     }
 }
 
-/// The two pixels whose centres enclose a texture coordinate, and the second one's weight.
+/// Indices of the two pixels whose centres enclose a texture coordinate, and the weight of the
+/// second.
 fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
     let c = if coordinate.is_finite() { coordinate } else { 0.0 };
-    // Reduced to one period first, so that far coordinates keep their precision.
+    // The coordinate is first reduced to one period, so that large coordinates keep their
+    // precision.
     let c = match wrap {
         Wrap::Repeat => c.rem_euclid(1.0),
         Wrap::Mirror => c.rem_euclid(2.0),

@@ -1,74 +1,76 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use umbrage::{Aabb, Light, LookAt};
 
-/// Triangles, what they look like, where they stand, and who looks on.
+/// A scene: triangles, their materials and transforms, cameras and lights.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Name for titles: the file's stem or the built-in scene's name.
+    /// Name for titles: the stem of the file's name, or the name of the built-in scene.
     pub name: String,
-    /// Each stored once.
+    /// The meshes, each stored once.
     pub meshes: Vec<Mesh>,
-    /// Each draws one mesh.
+    /// The instances, each of which draws one mesh.
     pub instances: Vec<Instance>,
-    /// Mesh fields refer here; never empty if there are meshes.
+    /// Materials, which [`Mesh::material`] indexes. Never empty if there are meshes.
     pub materials: Vec<Material>,
-    /// Material fields refer here.
+    /// Textures, which [`Material::base_color_texture`] indexes.
     pub textures: Vec<Texture>,
     /// The file's cameras, in the order of the nodes that hold them (parents before children).
     pub cameras: Vec<SceneCamera>,
     /// The file's lights, in the order of the nodes that hold them (parents before children).
     pub lights: Vec<SceneLight>,
-    /// What was repaired or left out on loading.
+    /// Notices of what was repaired or left out on loading.
     pub notices: Vec<Notice>,
 }
 
 /// Triangles of one material, in their own space.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// Metres in mesh space; all finite.
+    /// Positions in mesh space, metres; all finite.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals, one a position.
+    /// Unit shading normals, one per position.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates, one a position; empty if the mesh has none.
+    /// Texture coordinates, one per position; empty if the mesh has none.
     pub uvs: Vec<Vec2>,
-    /// Corners of each triangle, counter-clockwise seen from the front; all in range.
+    /// Indices of the corners of each triangle, counter-clockwise as seen from the front; all in
+    /// range.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
     pub material: usize,
 }
 
-/// A mesh standing somewhere.
+/// A mesh, drawn with a transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Finite and invertible.
+    /// Transform from mesh space to world space; finite and invertible.
     pub world_from_mesh: DAffine3,
 }
 
-/// What a surface looks like.
+/// The look of a surface.
 #[derive(Clone, Debug)]
 pub struct Material {
-    /// For messages.
+    /// Name for messages.
     pub name: String,
-    /// Linear red, green, blue and alpha, multiplied with the texture.
+    /// Linear red, green, blue and alpha. They are multiplied with the texture.
     pub base_color: Vec4,
-    /// Colour (sRGB, decoded on sampling) and alpha over the mesh's `uvs`.
+    /// Texture with colour (sRGB, decoded on sampling) and alpha, addressed by the mesh's `uvs`.
     pub base_color_texture: Option<TextureId>,
-    /// How alpha is meant.
+    /// How alpha is interpreted.
     pub alpha: Alpha,
-    /// glTF's flag, for renderers that cull back faces. Shadows are cast by both sides.
+    /// glTF's flag, for renderers that cull back faces. Both sides cast shadows whatever it says.
     pub double_sided: bool,
 }
 
-/// How a material's alpha is meant.
+/// How a material's alpha is interpreted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Alpha {
-    /// Ignored.
+    /// Alpha is ignored.
     Opaque,
-    /// Where alpha is below the cutoff there is no surface: it neither shows nor casts.
+    /// Where alpha is below the cutoff there is no surface: it is neither visible nor casts a
+    /// shadow.
     Mask {
-        /// In [0, 1].
+        /// The cutoff, in [0, 1].
         cutoff: f32,
     },
 }
@@ -77,50 +79,50 @@ pub enum Alpha {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TextureId(pub usize);
 
-/// An 8-bit sRGB image with straight alpha, with its addressing.
+/// An 8-bit sRGB image with straight alpha, and its addressing modes.
 #[derive(Clone, Debug, Default)]
 pub struct Texture {
-    /// Pixels, both at least 1.
+    /// Width and height, pixels, both at least 1.
     pub size: [u32; 2],
-    /// Row by row from v = 0, red, green, blue, alpha.
+    /// Pixels row by row from v = 0, each as red, green, blue, alpha.
     pub rgba: Vec<[u8; 4]>,
-    /// What lies outside [0, 1], for u and for v.
+    /// Addressing outside [0, 1], for u and for v.
     pub wrap: [Wrap; 2],
 }
 
-/// How a texture goes on outside [0, 1].
+/// How a texture continues outside [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
-    /// Again and again, glTF's default.
+    /// It repeats; this is glTF's default.
     #[default]
     Repeat,
-    /// Again and again, every second time mirrored.
+    /// It repeats, and every second copy is mirrored.
     Mirror,
-    /// With its edge pixels.
+    /// It continues with the pixels of its edge.
     Clamp,
 }
 
-/// A camera of the scene. Its picture's size, and with it the aspect, come from the user.
+/// A camera of the scene. The user chooses the size of the picture, and with it the aspect ratio.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCamera {
-    /// The file's name for it, or `camera0`, `camera1`, …
+    /// The file's name of the camera, or `camera0`, `camera1`, …
     pub name: String,
-    /// Metres.
+    /// Position of the eye in world space, metres.
     pub eye: DVec3,
-    /// A point along the view direction, metres.
+    /// A point along the view direction, world space, metres.
     pub target: DVec3,
-    /// Up in the picture.
+    /// The direction that is up in the picture.
     pub up: DVec3,
     /// Vertical field of view, radians.
     pub fov_y_rad: f64,
-    /// Metres.
+    /// Near distance, metres.
     pub near: f64,
-    /// Metres; always finite.
+    /// Far distance, metres; always finite.
     pub far: f64,
 }
 
 impl SceneCamera {
-    /// The view of a picture of so many pixels.
+    /// The camera's parameters for a picture of `image` pixels (width, height).
     pub fn look_at(&self, image: [u32; 2]) -> LookAt {
         let Self { eye, target, up, fov_y_rad, near, far, .. } = *self;
         LookAt { eye, target, up, fov_y_rad, near, far, image }
@@ -130,33 +132,34 @@ impl SceneCamera {
 /// A light of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneLight {
-    /// The file's name for it, or `light0`, `light1`, …
+    /// The file's name of the light, or `light0`, `light1`, …
     pub name: String,
-    /// Where it shines.
+    /// Position, direction and extent of the light.
     pub light: Light,
-    /// Linear red, green, blue, largest 1.
+    /// Linear red, green and blue, of which the largest is 1.
     pub color: Vec3,
-    /// As in the file: lux for directional lights, candela for the others.
+    /// Intensity as in the file: in lux for directional lights, in candela for the others.
     pub intensity: f32,
 }
 
-/// Something that was repaired or left out on loading, in one sentence.
+/// One sentence about something that was repaired or left out on loading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notice(pub String);
 
 impl Scene {
-    /// Triangles as drawn: each instance counts its mesh's.
+    /// Number of triangles as drawn: each instance counts the triangles of its mesh.
     pub fn drawn_triangles(&self) -> u64 {
         self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len() as u64).sum()
     }
 
-    /// Triangles as stored.
+    /// Number of triangles as stored.
     pub fn stored_triangles(&self) -> u64 {
         self.meshes.iter().map(|m| m.triangles.len() as u64).sum()
     }
 
-    /// A box around each instance, in their order, metres, world space: the mesh's own box, moved.
-    /// Roomy where an instance is turned; [`Aabb::EMPTY`] where its mesh has no triangles.
+    /// A box around each instance, in the order of the instances, world space, metres: the box of
+    /// the mesh, transformed. It is loose where an instance is rotated, and [`Aabb::EMPTY`] where
+    /// the mesh has no triangles.
     pub fn instance_boxes(&self) -> Vec<Aabb> {
         let boxes: Vec<Aabb> = self.meshes.iter().map(Mesh::bounds).collect();
         let moved = |i: &Instance| {
@@ -166,9 +169,9 @@ impl Scene {
         self.instances.iter().map(moved).collect()
     }
 
-    /// The box around everything drawn, metres, world space, exact to rounding; [`Aabb::EMPTY`]
-    /// without triangles. Costs a pass over the vertices of every instance that is turned and may
-    /// reach beyond those before it.
+    /// The box around everything drawn, world space, metres, exact to rounding; [`Aabb::EMPTY`]
+    /// without triangles. Takes a pass over the vertices of every instance that is rotated and may
+    /// extend beyond the instances before it.
     pub fn bounds(&self) -> Aabb {
         let mut all = Aabb::EMPTY;
         for (i, roomy) in self.instances.iter().zip(self.instance_boxes()) {
@@ -176,7 +179,7 @@ impl Scene {
                 continue;
             }
             let m = i.world_from_mesh.matrix3;
-            // Boxes stay boxes under scaling, mirroring and swapping of axes.
+            // A transform that scales, mirrors and swaps axes takes boxes to boxes.
             let keeps_axes = [m.x_axis, m.y_axis, m.z_axis]
                 .iter()
                 .all(|a| a.to_array().iter().filter(|&&c| c != 0.0).count() == 1);
@@ -189,7 +192,7 @@ impl Scene {
 }
 
 impl Mesh {
-    /// The box around the triangles' corners, metres, mesh space.
+    /// The box around the corners of the triangles, mesh space, metres.
     pub fn bounds(&self) -> Aabb {
         self.bounds_in(|p| p)
     }

@@ -1,4 +1,5 @@
-//! The built-in scenes: sound geometry, the promised sizes, closed-form shadows.
+//! The built-in scenes have sound geometry, sizes as promised, and shadows as their closed forms
+//! say.
 
 use glam::{DVec3, Vec3};
 use umbrage::Aabb;
@@ -65,7 +66,7 @@ fn default_sizes_build_quickly_and_largest_reach_millions() {
         assert!(scene.drawn_triangles() <= 1_000_000, "{}: {}", info.name, scene.drawn_triangles());
         let [a, b] = [info.max_size / 8, info.max_size / 4]
             .map(|s| builtin(info.name, Some(s)).unwrap().drawn_triangles() as f64);
-        // The growth from one to the next, twice more.
+        // Extrapolates the growth from one size to the next by two more steps.
         assert!(b * (b / a).powi(2) > 4e6, "{}: {a} and {b} triangles", info.name);
     }
 }
@@ -108,7 +109,7 @@ fn unknown_names_and_sizes_are_refused_helpfully() {
     }
 }
 
-/// Whether anything stands between a ground point and the light, by trying every triangle.
+/// Whether anything lies between a ground point and the light, tested with every triangle.
 fn blocked(scene: &Scene, from: DVec3, to_light: DVec3) -> bool {
     let origin = from + to_light * 1e-6;
     scene.instances.iter().any(|i| {
@@ -116,7 +117,7 @@ fn blocked(scene: &Scene, from: DVec3, to_light: DVec3) -> bool {
         mesh.triangles.iter().any(|t| {
             let [a, b, c] = t
                 .map(|k| i.world_from_mesh.transform_point3(mesh.positions[k as usize].as_dvec3()));
-            // Möller and Trumbore 1997.
+            // The test of Möller and Trumbore 1997.
             let (e1, e2) = (b - a, c - a);
             let p = to_light.cross(e2);
             let det = e1.dot(p);
@@ -141,7 +142,8 @@ fn closed_forms_agree_with_their_geometry() {
         for direction in [DVec3::new(0.7, -1.0, 0.3), DVec3::new(-0.9, -0.8, 0.0), DVec3::NEG_Y] {
             let mut dark = 0;
             for k in 0..4000 {
-                // A spiral around the origin: dense at the foot of things, as far as shadows reach.
+                // A spiral around the origin: dense at the feet of objects, and as wide as their
+                // shadows are long.
                 let (r, a) = (7.0 * (f64::from(k) + 0.5) / 4000.0, f64::from(k) * 2.399_963);
                 let p = DVec3::new(r * a.cos(), 0.0, r * a.sin());
                 let step = 4e-3;

@@ -1,5 +1,5 @@
-//! Damaged files: every small real scene, cut short and with bytes changed at hundreds of places,
-//! loads or gets an error, and what loads is sound.
+//! Damaged files: each small real scene is cut short and changed at hundreds of places. Loading
+//! gives a sound scene or an error.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -41,7 +41,8 @@ fn damaged_files_never_panic() {
                     let what = format!("{file}, round {round}");
                     match load(&damaged) {
                         Ok(scene) => {
-                            // Views cost a hundred times as much as loading.
+                            // Choosing a view costs a hundred times as much as loading, so only
+                            // some scenes get one.
                             if loaded.fetch_add(1, Relaxed) % 32 == 0 {
                                 assert_view(&scene, &what);
                             }
@@ -56,12 +57,12 @@ fn damaged_files_never_panic() {
             });
         }
     });
-    // Both outcomes occur: the damage is neither harmless nor always fatal.
+    // Both outcomes must occur, or the damage would be too small or too large to test anything.
     let (loaded, refused) = (loaded.into_inner(), refused.into_inner());
     assert!(loaded > 300 && refused > 300, "{loaded} loaded, {refused} refused");
 }
 
-/// Changes files, the same way each time.
+/// Changes files in a reproducible way.
 struct Damage(u64);
 
 impl Damage {
@@ -76,7 +77,8 @@ impl Damage {
         let mut copy = bytes.to_vec();
         match round % 6 {
             0 => copy.truncate(self.below(bytes.len())),
-            // Digits of indices, counts and offsets become others: the JSON stays valid.
+            // Digits of indices, counts and offsets are replaced by others, and the JSON stays
+            // valid.
             1..=3 => {
                 for _ in 0..=round % 4 {
                     let start = 20 + self.below(json_end - 20);

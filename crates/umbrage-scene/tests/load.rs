@@ -1,4 +1,4 @@
-//! What glTF features become, and what broken files get: small files, made here.
+//! How features of glTF are loaded, and how invalid files are refused, with small files made here.
 
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use umbrage::{Light, PointLight, SpotLight};
 use umbrage_scene::{Alpha, Scene, SceneError, Wrap, load};
 
-/// Sine and cosine of 45°, of quaternions that make a quarter turn.
+/// Sine and cosine of 45°, which quaternions of a quarter turn consist of.
 const QUARTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A file under construction: JSON, and one buffer beside it.
@@ -17,8 +17,8 @@ struct File {
 }
 
 impl File {
-    /// One triangle, (0,0,0) (1,0,0) (0,1,0) with normals +z and texture coordinates like x and y,
-    /// on one node.
+    /// One triangle with corners (0,0,0), (1,0,0) and (0,1,0), normals +z and texture coordinates
+    /// equal to x and y, on one node.
     fn triangle() -> Self {
         let json = json!({
             "asset": {"version": "2.0"},
@@ -112,7 +112,7 @@ impl File {
         self
     }
 
-    /// As `.gltf` with its buffer beside it.
+    /// Writes the file as `.gltf` with its buffer beside it.
     fn write(self, folder: &Path) -> PathBuf {
         let length = self.buffer.len();
         std::fs::write(folder.join("a buffer.bin"), &self.buffer).unwrap();
@@ -141,7 +141,7 @@ impl File {
         load(&self.write(folder.path()))
     }
 
-    /// The error's message after the file's name.
+    /// The message of the error that loading gives, after the file's name.
     fn error(self) -> String {
         let folder = TempDir::new().unwrap();
         let path = self.write(folder.path());
@@ -202,7 +202,7 @@ fn nodes_nest_and_share_meshes() {
     let scene = file.load().unwrap();
     assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 2));
     let corner = |i: usize| scene.instances[i].world_from_mesh.transform_point3(DVec3::X);
-    // x turns to −z, is doubled, then moved.
+    // The x axis is rotated to −z, then doubled, then moved.
     assert!((corner(0) - DVec3::new(10.0, 0.0, -4.0)).length() < 1e-6, "{}", corner(0));
     assert_eq!(corner(1), DVec3::new(-1.0, 0.0, 5.0), "mirrored");
 }
@@ -224,7 +224,7 @@ fn instancing_extension_draws_copies() {
         let extension = json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}});
         File::triangle().set("/nodes/0/extensions", extension)
     };
-    // Attributes of the file's own move nothing.
+    // Custom attributes move nothing.
     assert_eq!(with(json!({"_ID": 0})).load().unwrap().instances.len(), 1);
     let error = with(json!({"TRANSLATION": "no"})).error();
     assert!(error.contains("TRANSLATION must be an accessor's index"), "{error}");
@@ -263,7 +263,7 @@ fn strips_and_fans_become_triangles_and_lines_are_left_out() {
     file.json["meshes"][0]["primitives"] = json!([primitive(5), primitive(6), primitive(1)]);
     let scene = file.load().unwrap();
     assert_eq!(scene.meshes.len(), 2);
-    // The strip's triangles face the same way; flat normals show it.
+    // Flat normals show that all triangles of the strip face the same way.
     assert_eq!(scene.meshes[0].triangles.len(), 2);
     assert_eq!(scene.meshes[0].normals, [Vec3::Z; 6]);
     assert_eq!(scene.meshes[1].triangles.len(), 2);
@@ -299,7 +299,7 @@ fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// The triangle with a texture of a clear left half and a red right half.
+/// The triangle with a texture whose left half is transparent and whose right half is red.
 fn masked() -> File {
     let mut file = File::triangle();
     let view = file.view(&png(&[[255, 0, 0, 0], [255, 0, 0, 255]], 2));
@@ -372,7 +372,7 @@ fn texture_transforms_and_other_coordinate_sets_apply() {
         "texCoord": 3, "offset": [0.5, 0.25], "rotation": std::f64::consts::FRAC_PI_2, "scale": [2, 3]
     }});
     let uvs = &file.load().unwrap().meshes[0].uvs;
-    // A quarter turn counter-clockwise, v down, takes u to −v and v to u.
+    // A counter-clockwise quarter turn takes u to −v and v to u, where v increases downwards.
     let expected = [Vec2::new(0.5, 0.25), Vec2::new(0.5, -1.75), Vec2::new(3.5, 0.25)];
     for (uv, expected) in uvs.iter().zip(expected) {
         assert!(uv.distance(expected) < 1e-5, "{uvs:?}");
@@ -422,7 +422,7 @@ fn cameras_look_along_minus_z() {
     assert!((forward - DVec3::NEG_X).length() < 1e-6, "{forward}");
     assert!((camera.up - DVec3::Y).length() < 1e-6);
     assert!((camera.fov_y_rad - 0.8).abs() < 1e-6);
-    // Endless in the file; the scene lies behind.
+    // The file states no far distance, so it follows from the scene.
     assert!(camera.near < camera.far && camera.far.is_finite());
     assert_eq!(scene.default_view(), *camera);
     assert!(notices(&scene)[0].contains("not a perspective camera"), "{:?}", notices(&scene));
@@ -432,7 +432,7 @@ fn cameras_look_along_minus_z() {
 fn lights_have_their_poses_and_sensible_ranges() {
     let mut file = File::triangle().set("/scenes/0/nodes", json!([0, 1, 2, 3]));
     for light in 0..3 {
-        // Turned to look down.
+        // The node is rotated so that the light points down.
         file.push(
             "nodes",
             json!({
@@ -473,7 +473,7 @@ fn lights_have_their_poses_and_sensible_ranges() {
     assert!(notice.contains("outerConeAngle"), "{notice}");
 }
 
-/// A triangle, and a node 10 m above it that shines with each of `lights`.
+/// A triangle, and a node 10 m above it that has each of `lights`.
 fn lit_by(lights: &Value) -> File {
     let nodes: Vec<usize> = (0..=lights.as_array().unwrap().len()).collect();
     let mut file = File::triangle().set("/scenes/0/nodes", json!(nodes));
@@ -503,7 +503,7 @@ fn lamps_end_where_the_file_says_and_shadows_begin_nearby() {
     assert_eq!(found[0], [8e-3, 8.0]);
     let endless = found[4][1];
     assert!((10.0..11.0).contains(&endless), "{endless}");
-    // However far a lamp shines, there is nothing of the scene beyond.
+    // The range may be large, but the scene ends earlier.
     assert_eq!(found[1], [1e-3 * endless, 1e12]);
     assert_eq!(found[3], found[4]);
     let camera = umbrage::Camera::look_at(umbrage::LookAt {
@@ -532,7 +532,7 @@ fn the_first_light_that_shines_is_the_scenes_own() {
     let own = |lights: Value| lit_by(&lights).load().unwrap().default_light();
     let lights = json!([point("burnt out", 0.0), point("bulb", 3.0), {"type": "directional"}]);
     assert_eq!(own(lights).name, "bulb");
-    // None shines: the sun does.
+    // No light of the file has an intensity above 0, so the sun is used.
     let sun = own(json!([point("burnt out", 0.0)]));
     assert!(matches!(sun.light, Light::Directional { .. }), "{sun:?}");
 }
@@ -550,7 +550,7 @@ fn skins_stand_in_the_pose_of_their_joints() {
     file.primitive()["attributes"]["WEIGHTS_0"] = json!(weights);
     file.push("skins", json!({"joints": [1, 2], "inverseBindMatrices": binds}));
     file.json["scenes"][0]["nodes"] = json!([0, 1]);
-    // The skinned node's own transform counts for nothing.
+    // The transform of the skinned node itself must be ignored.
     file.json["nodes"] = json!([
         {"mesh": 0, "skin": 0, "translation": [100, 0, 0]},
         {"translation": [1000000, 0, 0], "children": [2]},
@@ -561,9 +561,10 @@ fn skins_stand_in_the_pose_of_their_joints() {
     let world = |i: usize| instance.world_from_mesh.transform_point3(mesh.positions[i].as_dvec3());
     let far = DVec3::X * 1e6;
     assert!((world(0) - far).length() < 1e-6, "{}", world(0));
-    // Joint 1 turns x to y about (0, 1, 0): (1,0,0) goes to (1,2,0); half of it and half at rest.
+    // Joint 1 rotates x to y about (0, 1, 0), which takes (1,0,0) to (1,2,0). Vertex 1 goes half
+    // that way.
     assert!((world(1) - far - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-6, "{}", world(1) - far);
-    // Its own point (0, 1, 0) stays, although the file's is a million metres from the origin.
+    // The joint's own point (0, 1, 0) stays exact, although it is a million metres from the origin.
     assert!((world(2) - far - DVec3::Y).length() < 1e-6, "{}", world(2) - far);
     assert!(mesh.normals.iter().all(|n| n.distance(Vec3::Z) < 1e-6));
 }
@@ -650,7 +651,8 @@ fn broken_files_say_what_is_wrong_and_where() {
         let error = file.error();
         assert!(error.contains(expected), "{error:?} should contain {expected:?}; {json}");
     }
-    // Numbers beyond single precision are read as infinite or refused, as serde_json was built.
+    // Numbers beyond single precision are read as infinite or refused, depending on serde_json's
+    // features.
     let error = t().set("/nodes/0/scale", json!([1e39, 1, 1])).error();
     let expected = ["nodes[0].scale: is not finite", "number out of range"];
     assert!(expected.iter().any(|e| error.contains(e)), "{error:?}");

@@ -1,10 +1,10 @@
-//! Every real scene, found through `UMBRAGE_SCENES` (by default `../shared/scenes` beside the
-//! workspace).
+//! Real scenes, from the folder that `UMBRAGE_SCENES` names (by default `../shared/scenes` beside
+//! the workspace).
 
 use std::path::PathBuf;
 use umbrage_scene::{Alpha, Scene, load};
 
-/// File, triangles stored and drawn, size in metres.
+/// File, stored triangles, drawn triangles, size in metres.
 #[rustfmt::skip]
 const SCENES: &[(&str, u64, u64, [f64; 3])] = &[
     ("atrium/sponza_atrium_reduced.glb", 33_663, 33_663, [27.48, 13.18, 12.56]),
@@ -102,7 +102,8 @@ fn the_barn_brings_its_own_light() {
 
 #[test]
 fn figures_stand_in_their_bind_pose() {
-    // CesiumMan's joints turn him upright: 1.5 m tall and narrow from side to side of his walk.
+    // CesiumMan's joints turn him upright: he is 1.5 m tall and narrow across the direction of his
+    // walk.
     let man = scene("characters/CesiumMan.glb").bounds();
     assert!(man.min.y.abs() < 0.02 && (man.max.y - 1.507).abs() < 0.01, "{man:?}");
     let fox = scene("characters/Fox.glb");

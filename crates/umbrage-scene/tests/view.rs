@@ -1,4 +1,4 @@
-//! Views and suns chosen for scenes that bring none.
+//! The views and suns that are chosen for scenes whose files have none.
 
 use glam::{DAffine3, DVec3};
 use std::path::PathBuf;
@@ -45,7 +45,7 @@ fn objects_are_seen_whole_from_outside() {
             lo[0] > 0.0 && lo[1] > 0.0 && hi[0] < 1280.0 && hi[1] < 720.0,
             "{file}: {lo:?} {hi:?}"
         );
-        // And not as a speck.
+        // The object must not appear too small.
         assert!(hi[0] - lo[0] > 800.0 || hi[1] - lo[1] > 450.0, "{file}: {lo:?} {hi:?}");
         assert!(view.eye.y > bounds.min.y, "{file}: from below");
         assert!((sun_elevation_deg(&scene) - 45.0).abs() < 1e-6, "{file}");
@@ -88,7 +88,7 @@ fn gentle_land_gets_a_low_sun_and_a_scene_its_own_light() {
     assert_eq!(barn.default_light(), barn.lights[0]);
 }
 
-/// A built-in world without its camera and sun, moved.
+/// A built-in scene without its camera and sun, transformed.
 fn moved(world_from_scene: DAffine3) -> Scene {
     let mut scene = builtin("statues", Some(3)).unwrap();
     scene.cameras.clear();

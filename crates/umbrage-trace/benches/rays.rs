@@ -1,4 +1,5 @@
-//! Rays a second, on one thread and on all, in a built-in scene and in a real one.
+//! Measures rays per second, on one thread and on all threads, in a built-in scene and in a real
+//! one.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;

@@ -7,27 +7,28 @@ use obvhs::{BvhBuildParams, fast_stack};
 use std::time::Duration;
 use umbrage::Aabb;
 
-/// A tree of boxes that finds the primitives a ray may meet, and never misses one.
+/// A bounding volume hierarchy that finds every primitive that a ray may meet.
 ///
-/// The tree works in single precision, around a centre in double precision, and every ray is moved
-/// to where it enters the outermost box first. With D the diagonal of that box, all coordinates are
-/// then below D/2 and all distances below D, and the errors of the box test are at most: ½·2⁻²⁴ D
-/// for the ray's origin, 2⁻²³ D for directions near an axis (obvhs bounds 1/d by 2²³), and 4·2⁻²⁴ D
-/// for the roundings of 1/d, d, difference and product. Padding every box by 2⁻²¹ D, more than their
-/// sum, makes the test conservative.
+/// The hierarchy stores its boxes in single precision, relative to a centre in double precision,
+/// and each ray's origin is first moved to where the ray enters the outermost box. With D the
+/// diagonal of that box, all coordinates are then below D/2 and all distances below D. The errors
+/// of the box test are then at most ½·2⁻²⁴ D for the ray's origin, 2⁻²³ D for directions near an
+/// axis (obvhs bounds 1/d by 2²³), and 4·2⁻²⁴ D for the roundings of 1/d, d, difference and
+/// product. Every box is padded by 2⁻²¹ D, which is more than the sum of these errors, so no box
+/// that the ray meets is missed.
 pub(crate) struct Boxes {
     center: DVec3,
     outermost: Aabb,
     tree: Bvh2,
 }
 
-/// A node of the tree.
+/// Index of a node of the hierarchy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node(usize);
 
 impl Boxes {
-    /// The tree for primitives with these indices and boxes, none empty. `slack` widens all boxes,
-    /// for errors that the caller makes.
+    /// Builds the hierarchy for primitives, given by their indices and their boxes, none of which
+    /// is empty. `slack` widens all boxes further, by the error of the caller's own computations.
     pub(crate) fn build(primitives: &[(u32, Aabb)], slack: f64) -> Self {
         let all = primitives.iter().fold(Aabb::EMPTY, |all, (_, b)| all.union(*b));
         if all.is_empty() {
@@ -45,7 +46,7 @@ impl Boxes {
                 obvhs::aabb::Aabb { min: Vec3A::from(down), max: Vec3A::from(up) }
             })
             .collect();
-        // The triangle test in double precision costs more than a box: small leaves.
+        // Leaves are small because a triangle test in double precision costs more than a box test.
         let parameters = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
         let mut tree = build_bvh2(&padded, parameters, &mut Duration::default());
         tree.max_depth = depth(&tree);
@@ -56,19 +57,19 @@ impl Boxes {
         Self { center, outermost, tree }
     }
 
-    /// The box around all primitives, and how to open it: `None` if there are none.
+    /// The root, whose box holds all primitives; `None` if there are no primitives.
     pub(crate) fn root(&self) -> Option<Node> {
         (!self.tree.nodes.is_empty()).then_some(Node(0))
     }
 
-    /// A node's box, padding and all.
+    /// The box of a node, padding included.
     pub(crate) fn aabb(&self, node: Node) -> Aabb {
         let aabb = self.tree.nodes[node.0].aabb();
         let corner = |p: Vec3A| p.as_dvec3() + self.center;
         Aabb { min: corner(aabb.min), max: corner(aabb.max) }
     }
 
-    /// What is in a node: two smaller ones, or primitives.
+    /// The contents of a node: `Ok` with its two children, or `Err` with the primitives of a leaf.
     pub(crate) fn open(&self, node: Node) -> Result<[Node; 2], &[u32]> {
         let node = &self.tree.nodes[node.0];
         let first = node.first_index as usize;
@@ -79,8 +80,9 @@ impl Boxes {
         }
     }
 
-    /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`, roughly
-    /// nearest first. `visit` returns where the search ends from then on, or `None` to stop.
+    /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`,
+    /// roughly nearest first. `visit` returns the new end of the range, or `None` to stop the
+    /// search.
     pub(crate) fn visit(
         &self,
         ray: Ray,
@@ -90,11 +92,13 @@ impl Boxes {
         let Some([start, end]) = clip(self.outermost, ray, range) else {
             return;
         };
-        // Not by the length, which underflows to zero for the shortest directions. No coordinate
-        // is then beyond 1, and all distances below D as well.
+        // The direction is divided by its longest coordinate and not by its length, because the
+        // length underflows to zero for the shortest directions. No coordinate then exceeds 1, and
+        // all distances still stay below D.
         let longest = ray.direction.abs().max_element();
         let entry = ray.origin + ray.direction * start - self.center;
-        // Nearest rounding may round down; the next float cannot be too near.
+        // Rounding to nearest may round a distance down. The next float is never below the
+        // distance, so the search never ends too early.
         let distance = |t: f64| (((t - start) * longest) as f32).next_up();
         let single = obvhs::ray::Ray::new(
             entry.as_vec3a(),
@@ -118,7 +122,7 @@ impl Boxes {
     }
 }
 
-/// The part of `range` in which the ray is inside the box.
+/// The part of `range` in which the ray is inside the box; `None` if the ray misses the box.
 fn clip(aabb: Aabb, ray: Ray, range: [f64; 2]) -> Option<[f64; 2]> {
     let [mut start, mut end] = range;
     for axis in 0..3 {
@@ -137,7 +141,7 @@ fn clip(aabb: Aabb, ray: Ray, range: [f64; 2]) -> Option<[f64; 2]> {
     (start <= end && start.is_finite()).then_some([start, end])
 }
 
-/// Inner nodes on the longest way down: the most that a traversal's stack can hold.
+/// The number of levels of the hierarchy. A traversal's stack never holds more nodes than that.
 fn depth(tree: &Bvh2) -> usize {
     let mut deepest = 1;
     let mut open = vec![(0usize, 1usize)];

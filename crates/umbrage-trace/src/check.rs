@@ -1,7 +1,8 @@
 use crate::Error;
 use umbrage_scene::{Mesh, Scene};
 
-/// That rays can deal with all that a mesh holds and refers to.
+/// Checks that rays can be traced against a mesh: its coordinates are finite and at most 10¹², its
+/// lists have matching lengths, and its indices exist.
 pub(crate) fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(), Error> {
     let wrong = |field: String, problem: String| {
         Err(Error::scene(format!("meshes[{index}].{field}"), problem))

@@ -1,8 +1,9 @@
-/// What can keep rays from being traced or a map from being rendered.
+/// Why a scene cannot be traced, a map cannot be rendered or a view cannot be sampled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A scene that refers to what it does not have, or has values no ray can deal with.
+    /// The scene refers to something that it does not contain, or holds a value that rays cannot be
+    /// traced with.
     #[error("{place}: {problem}")]
     Scene {
         /// Path of the field, such as `meshes[3].triangles[17]`.
@@ -10,18 +11,18 @@ pub enum Error {
         /// What is wrong with it and what would be right.
         problem: String,
     },
-    /// A depth map too large for this machine.
+    /// A depth map is too large for this machine's memory.
     #[error("a depth map of {}x{} texels does not fit into memory", resolution[0], resolution[1])]
     Memory {
-        /// Texels in s and t.
+        /// Resolution of the map in s and t, texels.
         resolution: [u32; 2],
     },
-    /// A number of samples out of range.
-    #[error("samples per pixel and axis must be 1 to {max}, are {given}")]
+    /// The number of samples per pixel is out of range.
+    #[error("samples along each side of a pixel must be 1 to {max}, not {given}")]
     Samples {
-        /// The number asked for.
+        /// The requested number of samples along each side of a pixel.
         given: u32,
-        /// The largest that works.
+        /// The largest valid number.
         max: u32,
     },
 }

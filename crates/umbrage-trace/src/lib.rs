@@ -1,14 +1,14 @@
 //! Ray-traced shadow truth, and a reference executor for shadow map plans, on the CPU.
 //!
-//! - [`Tracer`] makes a scene ready for rays.
-//! - [`View`] finds the surfaces that a camera sees, and whether light reaches them: the *truth*. It
-//!   shoots rays at the light itself and knows nothing of plans.
-//! - [`Reference`] executes a [`Plan`](umbrage::Plan) as it would be with no error but the plan's own:
-//!   each texel is a ray ([`DepthMap`]), lookups are those of [`umbrage::visibility`].
+//! - [`Tracer`] prepares a scene for ray tracing.
+//! - [`View`] finds the surfaces that a camera sees, and whether light reaches them: the *truth*.
+//!   It traces rays to the light itself and does not use plans.
+//! - [`Reference`] executes a [`Plan`](umbrage::Plan) without adding errors to the plan's own: each
+//!   texel's depth comes from a ray ([`DepthMap`]), and [`umbrage::visibility`] does the lookups.
 //! - [`shade`] turns samples and their visibility into pictures.
 //!
 //! ```
-//! use umbrage::{Bounds, Camera, Light, LookAt, Options, Planner, visibility::Filter};
+//! use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique, visibility::Filter};
 //! use umbrage_trace::{Reference, Tracer, View, shade};
 //!
 //! let scene = umbrage_scene::builtin("pole", None)?;
@@ -25,10 +25,11 @@
 //! let light = Light::Directional { direction: glam::dvec3(1.0, -1.0, 0.5) };
 //! let mut planner = Planner::new();
 //! let bounds = Bounds::of_scene(scene.bounds());
-//! let plan = planner.plan(&camera, &[light], &bounds, &Options::default())?;
+//! let technique = Technique { filter: Filter::pcf(3)?, ..Technique::default() };
+//! let plan = planner.plan(&camera, &[light], &bounds, &technique)?;
 //!
 //! let quietly = |_rows: u64| {};
-//! let reference = Reference::render(&tracer, plan, Filter::pcf(3)?, &quietly)?;
+//! let reference = Reference::render(&tracer, plan, &quietly)?;
 //! let view = View::new(&tracer, camera, light, 1)?;
 //! let mut pixels = Vec::new();
 //! for rows in view.bands() {
@@ -42,7 +43,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everything runs on all of rayon's threads, and gives the same result on any number of them.
+//! All work is shared by the threads of rayon's current pool. The results do not depend on how many
+//! threads there are.
 
 mod boxes;
 mod check;
@@ -62,14 +64,16 @@ pub use tracer::{Hit, PrimitiveRef, Surface, Tracer};
 
 use glam::DVec3;
 
-/// A half-line, or a line if its range begins before zero: the points `origin + t direction`.
+/// A ray: the points `origin + t direction` for all t in a range that each query states. A range
+/// that begins below zero extends the ray behind its origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// World space, metres.
+    /// Origin in world space, metres.
     pub origin: DVec3,
-    /// World space; any length but zero, and t counts in it.
+    /// Direction in world space, of any length but zero. The parameter t counts lengths of
+    /// `direction`.
     pub direction: DVec3,
 }
 
-/// Is told, on any thread, how many more rows are done.
+/// A callback that is told how many more rows are done. Any thread may call it.
 pub type Progress<'a> = &'a (dyn Fn(u64) + Sync);

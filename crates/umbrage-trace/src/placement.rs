@@ -3,16 +3,17 @@ use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
 use umbrage_scene::Scene;
 
-/// Entries of transforms and of their inverses beyond this are refused: their squares would overflow.
+/// Largest magnitude that an entry of a transform, or of its inverse, may have. The squares of
+/// larger entries would overflow.
 const LARGEST: f64 = 1e150;
 
-/// An instance's transform, split into what rays need.
+/// An instance's transform, in the forms that ray tracing needs.
 pub(crate) struct Placement {
     pub(crate) mesh: usize,
     pub(crate) world_from_mesh: DAffine3,
-    /// Takes directions, and positions relative to the instance's own.
+    /// Takes directions to mesh space, and so it does positions relative to the instance's origin.
     pub(crate) mesh_from_world: DMat3,
-    /// Bound of how much the transform stretches any vector.
+    /// Upper bound of the factor by which the transform lengthens any vector.
     stretch: f64,
 }
 
@@ -45,13 +46,14 @@ impl Placement {
         Aabb::around(mesh_bounds.corners().map(|c| self.world_from_mesh.transform_point3(c)))
     }
 
-    /// How far from `position` its triangle may have been meant to be, metres.
+    /// Upper bound of the distance between `position`, computed on the triangle with these corners,
+    /// and the triangle before its corners were rounded, metres.
     ///
-    /// Each coordinate of a corner was rounded by up to 2⁻²⁴ of itself when it was stored, a corner
-    /// thus moved by up to √3·2⁻²⁴ of the largest coordinate, and the triangle by as much. The steps in
-    /// double precision (interpolation, transform and back) are some ten roundings of 2⁻⁵³ of the
-    /// mesh's and the world's coordinates; the former vanish beside 2⁻²⁴, the latter do not far from
-    /// the origin.
+    /// Storing a corner in single precision rounds each coordinate by up to 2⁻²⁴ of itself. This
+    /// moves the corner, and with it the triangle, by up to √3·2⁻²⁴ of its largest coordinate. The
+    /// steps in double precision (interpolation, transform and back) add some ten roundings of 2⁻⁵³
+    /// of the mesh's and the world's coordinates. The roundings of mesh coordinates are negligible
+    /// beside 2⁻²⁴; those of world coordinates are not, far from the origin.
     pub(crate) fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
         let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
         let world =
@@ -60,8 +62,9 @@ impl Placement {
     }
 }
 
-/// How much a transform stretches any vector, at most; exact without shear. The square of the largest
-/// singular value is the largest eigenvalue of MᵀM, which no row sum's maximum is below.
+/// Upper bound of the factor by which a matrix lengthens any vector, exact for a matrix without
+/// shear. The square of the largest singular value is the largest eigenvalue of MᵀM, and the
+/// largest row sum of |MᵀM| is never below that eigenvalue.
 pub(crate) fn stretch(m: DMat3) -> f64 {
     let square = m.transpose() * m;
     let row_sums = square.x_axis.abs() + square.y_axis.abs() + square.z_axis.abs();

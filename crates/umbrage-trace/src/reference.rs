@@ -8,26 +8,28 @@ use umbrage::visibility::{
 };
 use umbrage::{Plan, ShadowMap};
 
-/// A shadow map's depths, each found by a ray through its texel's centre.
+/// The depths of a shadow map, each found by a ray through its texel's centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     resolution: [u32; 2],
     gutter: u32,
-    /// Texels with the gutter, and whatever is drawn behind its end.
+    /// Texels in s and t that were drawn: the map, its gutter, and the texels that pad the gutter's
+    /// far end.
     drawn: [u32; 2],
     texels: Vec<f32>,
 }
 
 impl DepthMap {
-    /// Casts a ray from the light's side along the beam of each texel of `map`, and of `gutter` more
-    /// texels all around it, which filters look into at the map's border.
+    /// Casts a ray from the light's side along the beam of each texel of `map` and of its gutter,
+    /// which is `gutter` texels wide on every side. Filters read the gutter at the map's border.
     ///
-    /// A texel holds the depth of the first hit, clamped to [0, 1]: what lies between the receivers
-    /// and the light is flattened onto depth 0 (Lloyd et al. 2006, §6.4), what lies behind them does
-    /// not matter. Where nothing is hit it holds 1. `progress` is told of each row, gutter included.
+    /// A texel holds the depth of the first hit, clamped to [0, 1]: casters between the light and
+    /// the receivers are flattened onto depth 0 (Lloyd et al. 2006, §6.4), and surfaces behind the
+    /// receivers do not matter. A texel whose ray hits nothing holds 1. `progress` is told of each
+    /// row, gutter included.
     ///
     /// # Errors
-    /// A map that does not fit into memory.
+    /// [`Error::Memory`] if the map does not fit into memory.
     pub fn render(
         tracer: &Tracer<'_>,
         map: &ShadowMap,
@@ -38,7 +40,7 @@ impl DepthMap {
         Self::render_drawn(tracer, map, gutter, drawn, progress)
     }
 
-    /// As [`render`](Self::render), so many texels in all.
+    /// As [`render`](Self::render), for `drawn` texels in s and t in all.
     fn render_drawn(
         tracer: &Tracer<'_>,
         map: &ShadowMap,
@@ -66,23 +68,23 @@ impl DepthMap {
         Ok(Self { resolution, gutter, drawn, texels })
     }
 
-    /// Rows that [`render`](Self::render) will report.
+    /// Number of rows that [`render`](Self::render) reports.
     pub fn rows(map: &ShadowMap, gutter: u32) -> u64 {
         if map.is_empty() { 0 } else { u64::from(map.resolution[1]) + 2 * u64::from(gutter) }
     }
 
-    /// Texels in s and t, without the gutter.
+    /// Resolution in s and t without the gutter, texels.
     pub fn resolution(&self) -> [u32; 2] {
         self.resolution
     }
 
-    /// Width of the gutter, and all that is drawn, texels.
+    /// Width of the gutter, and resolution of all that is drawn, texels.
     pub(crate) fn drawn(&self) -> (u32, [u32; 2]) {
         (self.gutter, self.drawn)
     }
 
-    /// Depth of texel (`i`, `j`); the nearest one that there is for indices beyond the gutter, 1 in a
-    /// map without texels.
+    /// Depth of texel (`i`, `j`), in [0, 1]. Indices beyond the drawn texels give the nearest drawn
+    /// texel. A map without texels gives 1.
     pub fn texel(&self, i: i32, j: i32) -> f32 {
         if self.texels.is_empty() {
             return 1.0;
@@ -95,7 +97,7 @@ impl DepthMap {
     }
 }
 
-/// What lookups read of a texel, bytes.
+/// Bytes of each texel that lookups read.
 fn bytes_per_texel(filter: Filter) -> u32 {
     match filter {
         Filter::Prefiltered(Prefilter { statistic, .. }) => {
@@ -105,7 +107,8 @@ fn bytes_per_texel(filter: Filter) -> u32 {
     }
 }
 
-/// Depth of the first hit along the beam through a point in texel coordinates.
+/// Depth of the first hit along the beam through a point in texel coordinates; `None` if nothing is
+/// hit.
 fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     let beam = map.beam(shadow_coordinates(map, texel))?;
     let ray = Ray { origin: beam.origin, direction: beam.direction };
@@ -114,16 +117,16 @@ fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     Some(depth.clamp(0.0, 1.0) as f32)
 }
 
-/// A plan, executed: its maps' depths, and lookups into them.
+/// A plan executed by ray tracing: the depths of its maps, and lookups into them.
 #[derive(Clone, Debug)]
 pub struct Reference<'a> {
     plan: &'a Plan,
     maps: Vec<DepthMap>,
-    /// One a map if the filter is applied ahead of lookup, else none.
+    /// One for each map if the plan's filter is a prefilter, else empty.
     statistics: Vec<StatisticMap>,
 }
 
-/// A map's depths, and what was made of them.
+/// A map's depths, with the prefiltered map made from them if the filter is a prefilter.
 struct Filtered<'a> {
     depths: &'a DepthMap,
     statistics: Option<&'a StatisticMap>,
@@ -148,7 +151,7 @@ impl Texels for Filtered<'_> {
     }
 }
 
-/// A place in one of a plan's maps.
+/// A position in one of a plan's maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapTexel {
     /// Index into [`Plan::maps`].
@@ -158,11 +161,12 @@ pub struct MapTexel {
 }
 
 impl<'a> Reference<'a> {
-    /// Renders the depths of all maps, with the gutter that the plan's filter needs. `progress` is told
-    /// of each row of texels; there are [`rows`](Self::rows).
+    /// Renders the depths of all maps, with the gutter that the plan's filter needs, and the
+    /// prefiltered maps if the filter is a prefilter. `progress` is told of each of the
+    /// [`rows`](Self::rows) of texels.
     ///
     /// # Errors
-    /// A map that does not fit into memory.
+    /// [`Error::Memory`] if a map does not fit into memory.
     pub fn render(
         tracer: &Tracer<'_>,
         plan: &'a Plan,
@@ -186,18 +190,19 @@ impl<'a> Reference<'a> {
         Ok(Self { plan, maps, statistics })
     }
 
-    /// Rows of texels that [`render`](Self::render) will report.
+    /// Number of rows of texels that [`render`](Self::render) reports.
     pub fn rows(plan: &Plan) -> u64 {
         let full = plan.maps.iter().filter(|m| !m.is_empty());
         full.map(|m| u64::from(plan.filter.drawn_texels(m.resolution)[1])).sum()
     }
 
-    /// Memory of all that is looked up, bytes: what a texel takes on a GPU, gutters included.
+    /// Memory that the maps which lookups read would take on a GPU, gutters and mip levels
+    /// included, bytes.
     pub fn bytes(&self) -> u64 {
         let stored = |m: &DepthMap| m.texels.len() as u64;
         let texels = self.maps.iter().map(stored).sum::<u64>()
             * u64::from(bytes_per_texel(self.plan.filter));
-        // A quarter, a sixteenth … of smaller and smaller copies.
+        // Mip level k has a 4ᵏ-th of the texels.
         let levels = match self.plan.filter {
             Filter::Prefiltered(prefilter) => {
                 let first = prefilter.first_level();
@@ -208,14 +213,14 @@ impl<'a> Reference<'a> {
         levels.map(|level| texels >> (2 * level)).sum()
     }
 
-    /// The maps' depths, in the plan's order.
+    /// The depths of the maps, in the order of [`Plan::maps`].
     pub fn depth_maps(&self) -> &[DepthMap] {
         &self.maps
     }
 
-    /// How much of one of the plan's lights the shadow maps let through to a sample, in [0, 1]; 0 for
-    /// surfaces that face away from it, 1 for those that no map serves. Where slices overlap, their
-    /// maps' answers blend.
+    /// Visibility of a sample under one of the plan's lights, in [0, 1], as the shadow maps have
+    /// it: 0 for surfaces that face away from the light, 1 for samples that no map serves. Where
+    /// slices overlap, the visibilities of their maps are blended.
     pub fn visibility(&self, light: usize, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
@@ -236,8 +241,8 @@ impl<'a> Reference<'a> {
         if shares > 0.0 { (sum / shares) as f32 } else { 1.0 }
     }
 
-    /// The map that has the largest share in a point under one of the plan's lights, and where in it
-    /// the point lies; `None` if no map serves it.
+    /// The map with the largest share in a point's visibility under one of the plan's lights, and
+    /// the point's position in that map; `None` if no map serves the point.
     pub fn texel(&self, light: usize, world_position: DVec3) -> Option<MapTexel> {
         let maps = self.plan.lookup(light, world_position);
         let (index, _) = maps.max_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use std::ops::Range;
 use umbrage::{Camera, Light, PointLight, SpotLight};
 
-/// Samples held at a time, about: some 100 MB.
+/// Approximate number of samples held in memory at a time, which take some 100 MB.
 const BAND_SAMPLES: u64 = 1 << 19;
 
-/// What a picture shows and how finely it is sampled: who looks, in which light, with how many rays.
+/// A picture to be sampled: the scene, the camera, the light, and the number of rays per pixel.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     tracer: &'a Tracer<'a>,
@@ -28,21 +28,23 @@ pub struct Band {
 /// A point of a surface that the camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Where, and what it looks like.
+    /// The surface at the point: position, normals and colour.
     pub surface: Surface,
     /// Distance along the view direction, metres.
     pub depth: f64,
-    /// Whether the seen side of the triangle faces the light and is within its reach (a lamp's range, a
-    /// spot light's cone): if not it is dark, whatever any shadow map says. Decided by the geometric
-    /// normal, for the triangle is what casts and receives.
+    /// Whether the visible side of the triangle faces the light and lies within the light's reach
+    /// (a spot or point light's range, a spot light's cone). If not, the sample is dark whatever
+    /// any shadow map says. The geometric normal decides, because triangles are what casts and
+    /// receives shadows.
     pub is_facing: bool,
 }
 
 impl<'a> View<'a> {
-    /// Each pixel is sampled on a regular grid of `grid` × `grid` points; one is at its centre.
+    /// Each pixel is sampled on a regular grid of `grid` × `grid` points. With an odd `grid`, one
+    /// of them is the pixel's centre.
     ///
     /// # Errors
-    /// A grid that is not 1 to 64.
+    /// [`Error::Samples`] if `grid` is not 1 to 64.
     pub fn new(
         tracer: &'a Tracer<'a>,
         camera: Camera,
@@ -55,12 +57,12 @@ impl<'a> View<'a> {
         Ok(Self { tracer, camera, light, grid })
     }
 
-    /// Who looks.
+    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// In which light.
+    /// The light.
     pub fn light(&self) -> &Light {
         &self.light
     }
@@ -70,12 +72,12 @@ impl<'a> View<'a> {
         self.grid
     }
 
-    /// At what.
+    /// The scene, as it is traced.
     pub fn tracer(&self) -> &'a Tracer<'a> {
         self.tracer
     }
 
-    /// Bands of rows that make up the picture from top to bottom, each of about half a million
+    /// Splits the picture's rows into bands, from top to bottom. Each band has about half a million
     /// samples (some 100 MB) whatever the picture's size, but at least one row.
     pub fn bands(&self) -> impl Iterator<Item = Range<u32>> + use<> {
         let [width, height] = self.camera.image();
@@ -84,7 +86,7 @@ impl<'a> View<'a> {
         (0..height).step_by(rows as usize).map(move |first| first..height.min(first + rows))
     }
 
-    /// What is seen in these rows, clipped to the picture.
+    /// Samples the surfaces seen in these rows. Rows beyond the picture are ignored.
     pub fn band(&self, rows: Range<u32>, progress: Progress<'_>) -> Band {
         let [width, height] = self.camera.image();
         let rows = rows.start.min(height)..rows.end.min(height);
@@ -108,20 +110,21 @@ impl<'a> View<'a> {
         })
     }
 
-    /// What is seen at a point of the picture, in pixels as for [`Camera::ray`]. Nearer than the
-    /// camera's near distance nothing is; beyond its far distance surfaces are seen, but no shadow
-    /// map serves them.
+    /// The surface seen at a point of the picture, given in pixels as for [`Camera::ray`]; `None`
+    /// where the sky shows. Surfaces nearer than the camera's near distance are not seen. Surfaces
+    /// beyond its far distance are seen, but no shadow map serves them.
     pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
         let ray = Ray { origin: self.camera.eye(), direction: self.camera.ray(pixel) };
         let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
         let surface = self.tracer.surface(&hit, ray.direction);
         let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
-        // The ray has unit depth, so its parameter is the depth.
+        // The ray's direction has depth 1, so its parameter t is the depth.
         Some(Sample { surface, depth: hit.t, is_facing })
     }
 
-    /// A point that another view saw, as this one sees it: `None` if it is outside the picture, nearer
-    /// than the camera's near distance, hidden, or turned away.
+    /// The sample that this view has at a point which another view saw. `None` if the point lies
+    /// outside the picture or nearer than the camera's near distance, is hidden, or its visible
+    /// side faces away.
     pub fn sees(&self, surface: &Surface) -> Option<Sample> {
         let to_eye = self.camera.eye() - surface.position;
         let depth = self.camera.depth(surface.position);
@@ -129,7 +132,7 @@ impl<'a> View<'a> {
         let size = glam::UVec2::from(self.camera.image()).as_dvec2();
         let is_inside = pixel.cmpge(DVec2::ZERO).all() && pixel.cmple(size).all();
         let is_towards = surface.geometric_normal.dot(to_eye) > 0.0;
-        // What is nearer to the eye than the near distance hides nothing.
+        // Surfaces nearer to the eye than the near distance hide nothing.
         let end = 1.0 - self.camera.near() / depth;
         let is_seen = is_inside
             && is_towards
@@ -149,10 +152,11 @@ impl<'a> View<'a> {
         is_facing && depth <= self.camera.far()
     }
 
-    /// Whether light reaches the sample: 1 or 0. The truth: one ray at the light itself.
+    /// The true visibility of the sample, 1 or 0, found by one ray to the light itself.
     ///
-    /// All that lies before a lamp casts, its own housing too; what is nearer to it than `near` gets no
-    /// shadow, as [`SpotLight`] and [`PointLight`] have it.
+    /// Every surface between a spot or point light and the sample casts, the light's own housing
+    /// included. Samples nearer to the light than its `near` distance are never in shadow, as
+    /// documented at [`SpotLight`] and [`PointLight`].
     pub fn truth(&self, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
@@ -176,8 +180,8 @@ impl Band {
         self.rows.clone()
     }
 
-    /// All samples, pixel by pixel from the left and row by row, grid × grid in each pixel (row by
-    /// row as well); `None` where the sky shows.
+    /// All samples, row by row and pixel by pixel from the left. Each pixel has grid × grid of
+    /// them, also row by row. `None` where the sky shows.
     pub fn samples(&self) -> &[Option<Sample>] {
         &self.samples
     }
@@ -187,7 +191,8 @@ impl Band {
         (self.grid * self.grid) as usize
     }
 
-    /// A value for each sample, in their order, computed on all threads; `Default` for the sky.
+    /// Computes a value for each sample on all threads, and returns them in the order of
+    /// [`samples`](Self::samples). Samples of the sky get `Default`.
     pub fn map<T: Default + Send>(
         &self,
         value: impl Fn(&Sample) -> T + Sync,
@@ -222,7 +227,8 @@ fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
     }
 }
 
-/// Distance from a point light along the nearest axis of the world, metres.
+/// Distance from a point light along the world axis that is nearest to the direction of `position`,
+/// metres.
 fn cube_depth(point: &PointLight, position: DVec3) -> f64 {
     (position - point.position).abs().max_element()
 }

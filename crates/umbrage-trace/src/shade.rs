@@ -1,23 +1,25 @@
-//! Samples as pictures: in the light of a sun and a sky, or as data to look at.
+//! Turns samples into pictures, lit by a sun and a sky, and into colours that show data.
 
 use crate::{Band, Sample, View};
 use glam::{DVec2, DVec3, Vec3};
 use umbrage::{Camera, Light};
 use umbrage_scene::daylight::{GLOW, GROUND_LIGHT, HORIZON, NADIR, SKY_LIGHT, SUN, ZENITH};
 
-/// The picture of a band, one sRGB colour a pixel. `visibility` has one value a sample, as
-/// [`Band::map`] makes it with [`View::truth`] or [`Reference::visibility`](crate::Reference::visibility).
+/// The picture of a band, one sRGB colour per pixel. `visibility` has one value per sample, as
+/// [`Band::map`] makes it with [`View::truth`] or
+/// [`Reference::visibility`](crate::Reference::visibility).
 ///
 /// # Panics
-/// Unless there is one value a sample.
+/// If `visibility` does not have one value per sample.
 pub fn picture(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<[u8; 3]> {
     pixels(&radiances(view, band, visibility), band.samples_per_pixel())
 }
 
-/// Linear colours of a band's samples, the sky's as well. `visibility` is as for [`picture`].
+/// Linear colours of a band's samples, those of the sky included. `visibility` is as for
+/// [`picture`].
 ///
 /// # Panics
-/// Unless there is one value a sample.
+/// If `visibility` does not have one value per sample.
 pub fn radiances(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<Vec3> {
     assert_eq!(visibility.len(), band.samples().len(), "one value a sample");
     let per_pixel = band.samples_per_pixel();
@@ -36,34 +38,37 @@ pub fn radiances(view: &View<'_>, band: &Band, visibility: &[f32]) -> Vec<Vec3> 
         .collect()
 }
 
-/// sRGB colours of pixels from the linear ones of their samples, pixel after pixel.
+/// The sRGB colours of pixels from the linear colours of their samples, which are given pixel by
+/// pixel.
 pub fn pixels(radiances: &[Vec3], samples_per_pixel: usize) -> Vec<[u8; 3]> {
     let pixels = radiances.chunks(samples_per_pixel.max(1));
-    // Compressing before averaging keeps edges against bright sky smooth.
+    // Tone mapping each sample before averaging keeps edges against a bright sky smooth.
     pixels.map(|p| encode(p.iter().copied().map(compress).sum::<Vec3>() / p.len() as f32)).collect()
 }
 
-/// Linear colour of a surface: diffuse, in the light that reaches it, the sky's and the ground's.
+/// Linear colour of a diffuse surface, lit by the light (as far as it is visible), the sky and the
+/// ground.
 pub fn radiance(light: &Light, sample: &Sample, visibility: f32) -> Vec3 {
     let surface = &sample.surface;
     let normal = surface.shading_normal;
     let to_light = light.direction_to_light(surface.position);
     let incidence = normal.dot(to_light).max(0.0) as f32;
     let direct = SUN * (incidence * visibility * attenuation(light, surface.position));
-    // Brighter on the light's side, as sky and ground are, so that shapes show in the shade too.
+    // Sky and ground are brighter on the light's side, so the ambient light is too. Shapes can then
+    // be told apart in the shade as well.
     let side = DVec3::new(to_light.x, 0.0, to_light.z);
     let up = (0.5 + 0.5 * normal.y) as f32;
     let ambient = GROUND_LIGHT.lerp(SKY_LIGHT, up) * (1.0 + 0.3 * normal.dot(side) as f32);
     surface.base_color * (direct + ambient)
 }
 
-/// A lamp's light fades smoothly to nothing at the end of its range (the window of Karis, Real
-/// Shading in Unreal Engine 4, 2013, Eq. 9, without the inverse square).
+/// The factor by which a spot or point light fades smoothly to nothing at the end of its range: the
+/// window of Karis, Real Shading in Unreal Engine 4, 2013, Eq. 9, without the inverse square.
 fn attenuation(light: &Light, position: DVec3) -> f32 {
     match light {
         Light::Directional { .. } => 1.0,
         Light::Spot(spot) => {
-            // Range counts along the axis, as for what is lit at all.
+            // A spot light's range counts along its axis, here as in `is_facing`.
             let axis = spot.direction.normalize_or_zero();
             let relative = axis.dot(position - spot.position) / spot.range;
             window(relative)
@@ -72,12 +77,12 @@ fn attenuation(light: &Light, position: DVec3) -> f32 {
     }
 }
 
-/// 1 at the lamp, 0 where its range ends.
+/// 1 at the light, 0 where its range ends.
 fn window(relative_distance: f64) -> f32 {
     (1.0 - relative_distance.powi(4)).max(0.0).powi(2) as f32
 }
 
-/// Linear colour of the sky at a point of the picture, pixels.
+/// Linear colour of the sky at a point of the picture, which is given in pixels.
 pub fn sky(light: &Light, camera: &Camera, pixel: DVec2) -> Vec3 {
     let direction = camera.ray(pixel).normalize();
     let height = direction.y as f32;
@@ -95,8 +100,8 @@ pub fn sky(light: &Light, camera: &Camera, pixel: DVec2) -> Vec3 {
     gradient + GLOW * glow.powi(6)
 }
 
-/// Khronos's PBR Neutral tone mapper (Khronos Group, 2024): leaves colours below 0.8 as they are,
-/// but for the 0.04 that a dielectric's reflection would add, and compresses highlights.
+/// The PBR Neutral tone mapper (Khronos Group, 2024). It compresses highlights. Colours below 0.8
+/// keep their values, less the 0.04 that a dielectric's reflection would have added.
 fn compress(color: Vec3) -> Vec3 {
     const START: f32 = 0.8 - 0.04;
     const DESATURATION: f32 = 0.15;
@@ -123,13 +128,13 @@ fn encode(linear: Vec3) -> [u8; 3] {
     })
 }
 
-/// A direction as a colour: each coordinate from −1 to 1 as 0 to 255.
+/// A unit vector as a colour: each coordinate from −1 to 1 becomes 0 to 255.
 pub fn normal_color(normal: DVec3) -> [u8; 3] {
     (normal * 0.5 + 0.5).to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
-/// Depth (metres) as grey, from white at the camera's near distance to black at its far one, by the
-/// logarithm, so that equal ratios are equal steps.
+/// Depth (metres) as grey, from white at the camera's near distance to black at its far distance,
+/// on a logarithmic scale: equal ratios of depth are equal steps of grey.
 pub fn depth_color(camera: &Camera, depth: f64) -> [u8; 3] {
     let relative = (depth / camera.near()).ln() / (camera.far() / camera.near()).ln();
     [((1.0 - relative.clamp(0.0, 1.0)) * 255.0).round() as u8; 3]

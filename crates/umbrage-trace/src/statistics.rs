@@ -1,4 +1,4 @@
-//! What filters that are applied ahead of lookup make of a map's depths.
+//! Prefiltered maps: what filters that are applied ahead of lookup make of a map's depths.
 
 use crate::{DepthMap, Error};
 use glam::DVec2;
@@ -7,18 +7,18 @@ use umbrage::ShadowMap;
 use umbrage::visibility::Prefilter;
 use umbrage::visibility::statistic::{Channels, MAX_CHANNELS, Storage};
 
-/// Numbers in place of depths, filtered, and rounded as they are stored.
+/// A prefiltered map: statistics of the map's depths, blurred, and rounded as they are stored.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct StatisticMap {
     channels: usize,
     gutter: u32,
-    /// Of the first of the levels.
+    /// The mip level that `levels[0]` holds.
     first_level: u32,
-    /// Each of half the resolution of the one before.
+    /// Mip levels, each at half the resolution of the one before.
     levels: Vec<Level>,
 }
 
-/// A copy of a map.
+/// A mip level of a prefiltered map.
 #[derive(Clone, Debug, PartialEq)]
 struct Level {
     size: [usize; 2],
@@ -26,8 +26,9 @@ struct Level {
 }
 
 impl StatisticMap {
-    /// Encodes and blurs, first along rows, then along columns, or makes smaller and smaller copies, each time rounding to what is stored.
-    /// Texels beyond what is drawn count as its last ones.
+    /// Encodes the depths as statistics and then blurs them, first along rows and then along
+    /// columns, or makes mip levels of them. Every step rounds its results to the stored format.
+    /// Texels beyond what is drawn have the values of the nearest drawn texel.
     pub(crate) fn new(
         map: &ShadowMap,
         depths: &DepthMap,
@@ -40,7 +41,7 @@ impl StatisticMap {
         if resolution.contains(&0) {
             return Ok(Self { channels, gutter, first_level, levels: Vec::new() });
         }
-        // Texels of the map to each that is stored.
+        // Texels of the map along each side of a stored texel.
         let step = 1 << first_level;
         let size = drawn.map(|n| (n >> first_level) as usize);
         let row = size[0] * channels;
@@ -86,7 +87,8 @@ impl StatisticMap {
         Ok(Self { channels, gutter, first_level, levels })
     }
 
-    /// Between texels bilinearly, in the map's texel coordinates, at a level.
+    /// The statistics at a point given in the map's texel coordinates, interpolated bilinearly
+    /// between the texels of a mip level.
     pub(crate) fn sample(&self, texel: DVec2, level: u32) -> Channels {
         let place = (texel + f64::from(self.gutter)) / f64::from(1u32 << level);
         let level = self.levels.get((level - self.first_level) as usize).or(self.levels.last());
@@ -95,7 +97,7 @@ impl StatisticMap {
 }
 
 impl Level {
-    /// Half as wide and high, both of which are even.
+    /// The next mip level, half as wide and half as high. Width and height of this level are even.
     fn halved(
         &self,
         channels: usize,
@@ -117,7 +119,8 @@ impl Level {
         Ok(Self { size, texels })
     }
 
-    /// Bilinearly between texels, from the level's own corner.
+    /// The statistics at `place`, interpolated bilinearly between texels. `place` is in texels of
+    /// this level, from the corner of its first drawn texel.
     fn sample(&self, place: DVec2, channels: usize) -> Channels {
         let mut sum = [0.0; MAX_CHANNELS];
         let corner = place - 0.5;
@@ -136,7 +139,8 @@ impl Level {
     }
 }
 
-/// One step of a separable filter for a run of numbers: `at` gives the run that lies so many steps away.
+/// One pass of a separable blur over a run of channels. `at(k)` is the run that lies k texels away
+/// along the direction of the blur.
 fn blur<'a>(to: &mut [f32], weights: &[f32], storage: Storage, at: impl Fn(isize) -> &'a [f32]) {
     to.fill(0.0);
     for (k, weight) in (0isize..).zip(weights) {

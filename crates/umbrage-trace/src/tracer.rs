@@ -22,9 +22,9 @@ pub struct PrimitiveRef {
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Distance along the ray, in lengths of its direction.
+    /// Parameter of the hit along the ray: its distance in lengths of the ray's direction.
     pub t: f64,
-    /// What was hit.
+    /// The triangle that was hit.
     pub primitive: PrimitiveRef,
     /// Weights of the triangle's three corners, each in [0, 1]; they sum to 1.
     pub barycentrics: [f64; 3],
@@ -33,42 +33,44 @@ pub struct Hit {
 /// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// The triangle it lies on.
+    /// The triangle that the point lies on.
     pub primitive: PrimitiveRef,
-    /// World space, metres: the triangle's own point, not one along the ray.
+    /// World space, metres. The position is computed from the triangle's corners, not along the
+    /// ray.
     pub position: DVec3,
-    /// How far from `position` the surface may have been meant to be, metres: its corners are
-    /// stored in single precision, and every step from there to here rounds.
+    /// Upper bound of the distance between `position` and the surface before rounding, metres: the
+    /// corners are stored in single precision, and every step from them to `position` rounds.
     pub position_error: f64,
-    /// The triangle's normal, unit length, world space, turned towards where it was seen from.
+    /// The triangle's normal, unit length, world space, turned towards the side that is seen.
     pub geometric_normal: DVec3,
-    /// The corners' normals, interpolated, unit length, world space, turned to the side of
+    /// The normals of the corners, interpolated; unit length, world space, turned to the side of
     /// `geometric_normal`.
     pub shading_normal: DVec3,
     /// Texture coordinates; zero if the mesh has none.
     pub uv: Vec2,
-    /// Linear red, green, blue.
+    /// Base colour: linear red, green, blue.
     pub base_color: Vec3,
 }
 
-/// A box on the way to [`Tracer::boxes`].
+/// A box that [`Tracer::boxes`] may replace by the boxes of its contents.
 #[derive(Clone, Copy)]
 struct Opened {
     aabb: Aabb,
     what: What,
 }
 
-/// What is in a box.
+/// The contents of a box.
 #[derive(Clone, Copy)]
 enum What {
     Instances(Node),
-    /// Of an instance.
+    /// A node of an instance's triangles.
     Triangles(u32, Node),
     Triangle,
 }
 
 impl Opened {
-    /// Half the box's surface: flat boxes have no volume, but are not small.
+    /// Half the surface area of the box, square metres. Area and not volume measures how large a
+    /// box is, because flat boxes have no volume.
     fn surface(&self) -> f64 {
         let size = self.aabb.size();
         size.dot(DVec3::new(size.y, size.z, size.x))
@@ -95,21 +97,21 @@ impl PartialEq for Opened {
 
 impl Eq for Opened {}
 
-/// A scene, ready for rays.
+/// A scene prepared for ray tracing.
 ///
-/// Two levels: a tree of boxes for each mesh, in mesh space, and one over the instances, so drawing a
-/// mesh a hundred times costs the memory of one. Triangles are tested in double precision, in mesh
-/// space, by a test that lets no ray through between neighbours (`ShearedRay`), and the single
-/// precision boxes are padded for all rounding there is (`Boxes`): no hit is ever lost, as long as
-/// rays start within 10⁷ or so scene sizes of the scene.
+/// There are two levels of hierarchy: one over the triangles of each mesh, in mesh space, and one
+/// over the instances. A mesh that is drawn a hundred times thus takes the memory of one. Triangles
+/// are tested in double precision, in mesh space, by a watertight test: no ray passes between
+/// neighbours (`ShearedRay`). The boxes are in single precision and are padded for all rounding
+/// (`Boxes`). No hit is ever lost, as long as rays start within some 10⁷ scene sizes of the scene.
 ///
-/// All triangles are seen and cast from both sides. A surface that alpha masks away is not there at
-/// all. Triangles without area are ignored.
+/// All triangles are visible and cast shadows from both sides. Where an alpha mask removes a
+/// surface, rays pass. Triangles without area are ignored.
 pub struct Tracer<'a> {
     scene: &'a Scene,
-    /// One a mesh.
+    /// One for each mesh.
     meshes: Vec<MeshBoxes<'a>>,
-    /// One an instance.
+    /// One for each instance.
     placements: Vec<Placement>,
     instances: Boxes,
     bounds: Aabb,
@@ -121,14 +123,14 @@ struct MeshBoxes<'a> {
     mask: Option<Mask<'a>>,
 }
 
-/// Where a surface is not, although its triangle is.
+/// An alpha mask: where `factor` times the texture's alpha is below `cutoff`, there is no surface.
 struct Mask<'a> {
     cutoff: f32,
     factor: f32,
     texture: Option<&'a Texture>,
 }
 
-/// A ray leaving a surface.
+/// A ray's origin on a surface.
 #[derive(Clone, Copy)]
 struct Departure {
     from: PrimitiveRef,
@@ -136,12 +138,12 @@ struct Departure {
 }
 
 impl<'a> Tracer<'a> {
-    /// Builds the trees, those of different meshes on all threads: a quarter of a second per million
-    /// stored triangles and thread.
+    /// Builds the hierarchies, those of different meshes on different threads. This takes a quarter
+    /// of a second per million stored triangles on one thread.
     ///
     /// # Errors
-    /// A scene whose indices are out of range, whose coordinates are not finite or beyond 10¹²
-    /// metres, or whose transforms cannot be inverted.
+    /// [`Error::Scene`] if the scene has an index out of range, coordinates that are not finite or
+    /// beyond 10¹² metres, or a transform that cannot be inverted.
     pub fn new(scene: &'a Scene) -> Result<Self, Error> {
         for (i, mesh) in scene.meshes.iter().enumerate() {
             check_mesh(mesh, i, scene)?;
@@ -164,8 +166,8 @@ impl<'a> Tracer<'a> {
             return Err(Error::scene(format!("instances[{i}]"), problem));
         }
 
-        // Rays are taken to mesh space with an error of a few roundings of the distance they come
-        // from; bound it by 32 roundings of the scene's size.
+        // Taking a ray to mesh space has an error of a few roundings of the distance from which the
+        // ray comes. The slack bounds this error by 32 roundings of the scene's size.
         let size = if bounds.is_empty() { 0.0 } else { bounds.size().length() };
         let mut slack = vec![0.0f64; scene.meshes.len()];
         for p in &placements {
@@ -181,7 +183,7 @@ impl<'a> Tracer<'a> {
         Ok(Self { scene, meshes, placements, instances, bounds, opaque: false })
     }
 
-    /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
+    /// Sets whether alpha masks are ignored, so that masked materials show and cast as solid.
     #[must_use]
     pub fn opaque(self, opaque: bool) -> Self {
         Self { opaque, ..self }
@@ -192,17 +194,20 @@ impl<'a> Tracer<'a> {
         self.scene
     }
 
-    /// A box around everything drawn, metres, world space; [`Aabb::EMPTY`] without triangles. Loose where
-    /// instances are turned; [`Scene::bounds`] is exact.
+    /// A box around everything drawn, world space, metres; [`Aabb::EMPTY`] if there are no
+    /// triangles. The box is loose around rotated instances; [`Scene::bounds`] gives the exact box.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// At most `limit` boxes that hold everything drawn between them, metres, world space: no single box's
-    /// air. They may overlap. A `limit` of 0 counts as 1, for something must hold what is drawn; without
-    /// triangles there are none.
+    /// At most `limit` boxes that together hold everything drawn, world space, metres. They leave
+    /// out much of the empty space that a single box around the scene would hold. Boxes may
+    /// overlap. A `limit` of 0 counts as 1, because something must hold what is drawn. Without
+    /// triangles there are no boxes.
     ///
-    /// The largest are opened first, down the trees that rays are traced with.
+    /// The boxes are those of the hierarchies that rays are traced with. Starting at the root, the
+    /// box with the largest surface area is replaced by its children first, as long as the limit
+    /// allows.
     pub fn boxes(&self, limit: usize) -> Vec<Aabb> {
         let part = |aabb: Aabb, what| Opened { aabb: aabb.intersection(self.bounds), what };
         let instances = |node| part(self.instances.aabb(node), What::Instances(node));
@@ -247,15 +252,16 @@ impl<'a> Tracer<'a> {
             if matches!(largest.what, What::Triangle) || !fits {
                 closed.push(largest.aabb);
             } else {
-                // None of an instance all of whose triangles are without area: it is not drawn.
+                // An instance whose triangles all lack area has no boxes, because it is not drawn.
                 opened.extend(parts);
             }
         }
         closed
     }
 
-    /// The first hit with `range[0] ≤ t < range[1]`; either end may be infinite. Of hits at equal t
-    /// the one with the smallest [`PrimitiveRef`]. `None` also for rays that are not finite.
+    /// The first hit with `range[0] ≤ t < range[1]`; either end may be infinite. Of several hits at
+    /// equal t it is the one with the smallest [`PrimitiveRef`]. Rays with coordinates that are not
+    /// finite hit nothing.
     pub fn closest(&self, ray: Ray, range: [f64; 2]) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         self.visit(ray, range, |primitive, hit| {
@@ -273,29 +279,29 @@ impl<'a> Tracer<'a> {
         self.any(ray, range, None)
     }
 
-    /// Whether anything lies in `direction` from a surface, nearer than `end` lengths of
+    /// Whether anything lies in `direction` from a point on a surface, nearer than `end` lengths of
     /// `direction`.
     ///
-    /// The surface does not hide itself, and no epsilon is needed for that: its own triangle is
-    /// skipped, and so is every other triangle in whose plane the point lies as far as can be known.
-    /// Those are neighbours met at an edge, copies of the triangle, and coplanar decals. "Can be
-    /// known" is the sum of both surfaces' [`position_error`](Surface::position_error): how far
-    /// storing corners in single precision moves a surface, 2⁻²³ of its corners' coordinates, plus
-    /// some 2⁻⁴⁹ of its world position.
+    /// The surface does not hide itself, although no epsilon is used: the search skips the point's
+    /// own triangle, and every other triangle whose plane the point may lie in, given the errors of
+    /// both. Such triangles are neighbours that share an edge, copies of the triangle, and coplanar
+    /// decals. The tolerance is the sum of both surfaces'
+    /// [`position_error`](Surface::position_error): 2⁻²³ of the corners' coordinates, by which
+    /// storing corners in single precision moves a surface, plus some 2⁻⁴⁹ of the world position.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
         let departure =
             Departure { from: surface.primitive, position_error: surface.position_error };
         self.any(Ray { origin: surface.position, direction }, [0.0, end], Some(departure))
     }
 
-    /// World position of a hit, metres: the triangle's own point, not one along the ray.
+    /// World position of a hit, metres, computed from the triangle's corners, not along the ray.
     pub fn position(&self, hit: &Hit) -> DVec3 {
         let placement = &self.placements[hit.primitive.instance as usize];
         let corners = self.corners(hit.primitive);
         placement.world_from_mesh.transform_point3(weigh(corners, hit.barycentrics))
     }
 
-    /// All about the surface at a hit, as seen from a ray travelling in `view_direction`.
+    /// The surface at a hit, as seen by a ray that travels in `view_direction`.
     pub fn surface(&self, hit: &Hit, view_direction: DVec3) -> Surface {
         let Hit { primitive, barycentrics, .. } = *hit;
         let placement = &self.placements[primitive.instance as usize];
@@ -352,7 +358,7 @@ impl<'a> Tracer<'a> {
         found
     }
 
-    /// Whether the ray started on this very triangle, or in its plane as far as can be known.
+    /// Whether the ray started on this very triangle, or in its plane as far as rounding can tell.
     fn is_left_behind(&self, d: Departure, origin: DVec3, primitive: PrimitiveRef) -> bool {
         if primitive == d.from {
             return true;
@@ -361,14 +367,15 @@ impl<'a> Tracer<'a> {
         let corners = self.corners(primitive);
         let local = placement.mesh_from_world * (origin - placement.world_from_mesh.translation);
         let plane = normal_of(corners);
-        // The distance from the plane in world space: n·(a − o) is the same number in every space.
+        // The product n·(a − o) is the same number in mesh space and in world space. Divided by the
+        // length of the world-space normal, it is the distance from the plane in world space.
         let world_plane = placement.mesh_from_world.transpose() * plane;
         let distance = plane.dot(corners[0] - local).abs();
         let error = d.position_error + placement.position_error(corners, origin);
         distance <= error * world_plane.length()
     }
 
-    /// Whether alpha leaves the surface there.
+    /// Whether the alpha mask leaves a surface at the hit.
     fn is_there(&self, primitive: PrimitiveRef, hit: &TriangleHit) -> bool {
         let index = self.placements[primitive.instance as usize].mesh;
         let Some(mask) = self.meshes[index].mask.as_ref().filter(|_| !self.opaque) else {
@@ -378,8 +385,8 @@ impl<'a> Tracer<'a> {
         mask.factor * mask.texture.map_or(1.0, |t| t.sample_alpha(uv)) >= mask.cutoff
     }
 
-    /// Shows `visit` every triangle the ray meets, and some beyond the range; `visit` returns where
-    /// the search ends from then on, or `None` to stop.
+    /// Calls `visit` with every triangle that the ray meets, and with some beyond the range.
+    /// `visit` returns the new end of the range, or `None` to stop the search.
     fn visit(
         &self,
         ray: Ray,
@@ -442,7 +449,7 @@ fn corners(mesh: &Mesh, triangle: u32) -> [DVec3; 3] {
     mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3())
 }
 
-/// The triangle's normal, twice its area long, in its own space.
+/// The triangle's normal in mesh space; its length is twice the triangle's area.
 fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
@@ -460,7 +467,7 @@ fn texture_coordinates(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) 
     (a * weights[0] + b * weights[1] + c * weights[2]).as_vec2()
 }
 
-/// The texture of a material on a mesh that has coordinates for it.
+/// The texture of a material; `None` if it has none or the mesh has no texture coordinates.
 fn texture_of<'a>(scene: &'a Scene, material: &Material, mesh: &Mesh) -> Option<&'a Texture> {
     let id = material.base_color_texture.filter(|_| !mesh.uvs.is_empty())?;
     Some(&scene.textures[id.0])

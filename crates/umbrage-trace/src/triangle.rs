@@ -1,7 +1,7 @@
 use crate::Ray;
 use glam::DVec3;
 
-/// Where a ray meets a triangle.
+/// Where a ray's line meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TriangleHit {
     pub(crate) t: f64,
@@ -9,17 +9,18 @@ pub(crate) struct TriangleHit {
     pub(crate) weights: [f64; 3],
 }
 
-/// A ray prepared for the watertight triangle test of Woop, Benthin and Wald (Watertight Ray/Triangle
-/// Intersection, JCGT 2013): space is sheared so that the ray runs along an axis, and the signs of
-/// three 2D edge functions tell in or out.
+/// A ray prepared for the watertight triangle test of Woop, Benthin and Wald (Watertight
+/// Ray/Triangle Intersection, JCGT 2013). The test shears space so that the ray runs along an axis,
+/// and the signs of three 2D edge functions then tell whether the ray passes inside the triangle.
 ///
-/// In f64 throughout. Neighbours see the same sheared corners, an edge function of swapped corners
-/// is exactly the negative, and fl(ab) − fl(cd) never has the wrong sign (rounding is monotonic), at
-/// worst it is zero, which counts as in for both. So no ray passes between triangles that share an
-/// edge or a corner.
+/// All of it is in double precision. No ray passes between triangles that share an edge or a
+/// corner: neighbours have the same sheared corners, and an edge function of swapped corners is
+/// exactly the negative. Because rounding is monotonic, fl(ab) − fl(cd) never has the wrong sign.
+/// At worst it is zero, which counts as inside for both triangles.
 pub(crate) struct ShearedRay {
     origin: DVec3,
-    /// Axes of the plane that corners are projected to, and the axis the ray mostly runs along.
+    /// Indices of the axes: two of the plane that corners are projected to, then the one with the
+    /// ray's largest component.
     axes: [usize; 3],
     shear: [f64; 3],
 }
@@ -39,7 +40,8 @@ impl ShearedRay {
         Self { origin: ray.origin, axes, shear }
     }
 
-    /// The hit, anywhere along the line and from either side.
+    /// The hit, anywhere along the ray's line and from either side of the triangle; `None` without
+    /// one.
     pub(crate) fn intersect(&self, corners: [DVec3; 3]) -> Option<TriangleHit> {
         let [sx, sy, sz] = self.shear;
         let [a, b, c] = corners.map(|corner| {
@@ -55,7 +57,8 @@ impl ShearedRay {
         }
         let determinant = u + v + w;
         if determinant == 0.0 {
-            return None; // edge-on: the neighbours, which are not, catch the ray
+            // The triangle is seen edge-on. Its neighbours, which are not, are hit instead.
+            return None;
         }
         let weights = [u, v, w].map(|e| e / determinant);
         let t = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) * sz;

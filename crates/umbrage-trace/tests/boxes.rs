@@ -1,4 +1,4 @@
-//! The boxes that [`Tracer::boxes`] gives a planner: all that is drawn is in them, and little air.
+//! The boxes that [`Tracer::boxes`] gives a planner hold all that is drawn, and little empty space.
 
 mod common;
 
@@ -10,7 +10,7 @@ use umbrage_trace::Tracer;
 
 const LIMITS: [usize; 6] = [0, 1, 2, 7, 256, 100_000];
 
-/// Boxes around all triangles of all instances that have an area, in world space.
+/// The boxes of all triangles of all instances that have an area, in world space.
 fn triangles(scene: &Scene) -> Vec<Aabb> {
     let of_instance = |(mesh, to_world): (usize, DAffine3)| {
         let mesh = &scene.meshes[mesh];
@@ -24,7 +24,7 @@ fn triangles(scene: &Scene) -> Vec<Aabb> {
     scene.instances.iter().flat_map(|i| of_instance((i.mesh, i.world_from_mesh))).collect()
 }
 
-/// Half the surfaces of all boxes, square metres.
+/// Half the surface area of all boxes, square metres.
 fn surface(boxes: &[Aabb]) -> f64 {
     boxes.iter().map(|b| b.size()).map(|s| s.x * s.y + s.y * s.z + s.z * s.x).sum()
 }
@@ -33,12 +33,12 @@ fn holds(outer: Aabb, inner: Aabb, slack: f64) -> bool {
     inner.min.cmpge(outer.min - slack).all() && inner.max.cmple(outer.max + slack).all()
 }
 
-/// Checks boxes for every limit; gives their number for each.
+/// Checks the boxes for every limit, and returns how many there are for each.
 fn check(name: &str, scene: &Scene) -> Vec<usize> {
     let tracer = Tracer::new(scene).unwrap();
     let triangles = triangles(scene);
     let all = scene.bounds();
-    // Some roundings of world coordinates, in f64.
+    // Some roundings of world coordinates in double precision.
     let slack = 1e-14 * all.min.abs().max(all.max.abs()).max_element();
     let count = |limit: usize| {
         let mut boxes = tracer.boxes(limit);
@@ -53,7 +53,7 @@ fn check(name: &str, scene: &Scene) -> Vec<usize> {
             assert!(found, "{name}, {limit}: {t:?} is in no box");
         }
         if limit >= triangles.len() {
-            // No air but that of the triangles' own boxes.
+            // The only empty space is that in the triangles' own boxes.
             let [found, expected] = [surface(&boxes), surface(&triangles)];
             assert_eq!(boxes.len(), triangles.len(), "{name}, {limit}");
             assert!((found - expected).abs() <= 1e-9 * expected, "{name}: {found}, {expected}");
@@ -65,7 +65,7 @@ fn check(name: &str, scene: &Scene) -> Vec<usize> {
 
 #[test]
 fn all_that_is_drawn_is_in_some_box() {
-    // Of every kind of scene, few enough triangles to look into each.
+    // One of every kind of scene, with few enough triangles to test each.
     for (name, size) in [
         ("town", 1),
         ("airfield", 1),
@@ -79,7 +79,7 @@ fn all_that_is_drawn_is_in_some_box() {
     ] {
         let scene = builtin(name, Some(size)).unwrap();
         let counts = check(name, &scene);
-        // What is there to be opened is opened.
+        // At least a third of the allowed boxes is used, if there are as many triangles.
         let triangles = triangles(&scene).len();
         for (count, limit) in counts.into_iter().zip(LIMITS) {
             assert!(3 * count >= limit.min(triangles), "{name}: {count} of {limit}");
@@ -98,7 +98,7 @@ fn instances_may_be_turned_sheared_and_mirrored() {
     let ball = || sphere(Vec3::new(3.0, 1.0, -2.0), 1.5, 12);
     let places = [turned, mirrored, sheared, at(0.0, 3.0, 0.0) * turned * mirrored];
     check("balls", &scene(vec![ball(), ground(5.0)], &places.map(|p| (0, p))));
-    // Two triangles and one instance, both opened as far as they go.
+    // One instance of two triangles: a limit of 2 opens it down to its triangles.
     let one = scene(vec![ground(5.0)], &[(0, turned)]);
     assert_eq!(check("a turned ground", &one)[..4], [1, 1, 2, 2]);
 }
@@ -111,7 +111,7 @@ fn triangles_without_area_get_no_box() {
     let some = scene(vec![soup(&[line, real, far_off])], &[(0, DAffine3::IDENTITY)]);
     let boxes = Tracer::new(&some).unwrap().boxes(256);
     assert_eq!(boxes, [Aabb::new(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0))]);
-    // A mesh of nothing else is not drawn, alone or among others.
+    // A mesh that has only such triangles is not drawn, alone or among others.
     let lines = || soup(&[line, far_off]);
     let none = scene(vec![lines()], &[(0, DAffine3::IDENTITY), (0, at(5.0, 0.0, 0.0))]);
     assert_eq!(Tracer::new(&none).unwrap().boxes(256), []);
@@ -129,8 +129,8 @@ fn nothing_drawn_needs_no_box() {
     }
 }
 
-/// A hall as a modeller may have it, all of one mesh, and as instances of one wall: the more boxes, the
-/// less of its air is in them.
+/// The same hall as one mesh and as instances of one wall. The more boxes there are, the less empty
+/// space they hold.
 #[test]
 fn more_boxes_hold_less_air() {
     let wall = |x: f32| sheet(Vec3::new(x, 0.0, -20.0), Vec3::Y * 5.0, Vec3::Z * 40.0);
@@ -148,8 +148,8 @@ fn more_boxes_hold_less_air() {
         };
         let volumes = [1, 2, 5, 10, 20, 80].map(volume);
         assert!((volumes[0] / (78.0 * 5.0 * 40.0) - 1.0).abs() < 1e-3, "{volumes:?}");
-        // A further box takes out the air between two walls, 2 m of the 78 m; at last, with one for each
-        // triangle, there is none.
+        // Each further box removes the empty space between two walls, 2 m of the 78 m. With one box
+        // for each triangle, no empty space is left.
         for (boxes, volume) in [2, 5, 10, 20, 40].into_iter().zip(&volumes[1..]) {
             let most = f64::from(40 - boxes) * 2.0 * 5.0 * 40.0;
             assert!(*volume <= most + 1.0, "{boxes}: {volumes:?}");

@@ -1,4 +1,4 @@
-//! Every kind of filter under a spot and a point light, against the truth.
+//! Every kind of filter under a spot light and a point light, against the truth.
 
 mod common;
 
@@ -11,7 +11,7 @@ use umbrage_trace::{Reference, Tracer, View};
 
 #[test]
 fn lamps_are_filtered_as_well_as_compared() {
-    // A floor, seen and lit at a slant, with sheets over it.
+    // A floor, seen and lit obliquely, under several sheets.
     let sheets = [(-3.0, 1.0, -4.0), (1.0, 0.5, 1.0), (3.0, 1.5, -2.0)];
     let mut meshes = vec![ground(12.0)];
     meshes.extend(sheets.map(|(x, y, z)| sheet(Vec3::new(x, y, z), Vec3::Z * 1.5, Vec3::X * 1.5)));
@@ -63,7 +63,7 @@ fn lamps_are_filtered_as_well_as_compared() {
                 let visibility = band.map(|s| reference.visibility(0, s), &nobody);
                 let pairs = truth.iter().zip(visibility);
                 let off = pairs.filter(|(t, v)| t.is_some_and(|t| (t - v).abs() > 0.5)).count();
-                // Of the pixels that are in shadow.
+                // The share is of the pixels that are in shadow.
                 off as f64 / dark as f64
             };
             let compared = wrong(Filter::Pcf { n: 3 });

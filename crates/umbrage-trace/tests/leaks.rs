@@ -1,4 +1,5 @@
-//! Light that leaks through filters which are applied ahead of lookup, where truth is in full shadow: behind a fence, as in Annen et al. 2007, Fig. 9.
+//! Light that leaks through prefilters where the truth is in full shadow: behind a fence, as in
+//! Annen et al. 2007, Fig. 9.
 
 mod common;
 
@@ -13,7 +14,8 @@ use umbrage_trace::{DepthMap, Reference, Tracer, View};
 
 const BLUR: Blur = Blur::Texels(7);
 
-/// What the blur itself lets through: its weights, over an exact comparison of each texel with the receiver's plane.
+/// The visibility that the blur itself gives: its weights, over an exact comparison of each texel
+/// with the receiver's plane.
 fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
     let map = &plan.maps[0];
     let kernel = Prefilter { statistic: Statistic::Vsm(Vsm::default()), blur: BLUR, half: false };
@@ -22,7 +24,7 @@ fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
     let radius = kernel.radius_texels() as i32;
     let corner = texel_coordinates(map, receiver.st) - 0.5;
     let (first, fraction) = (corner.floor(), corner - corner.floor());
-    // Bilinear between texels.
+    // Bilinear interpolation between texels spreads each weight over two neighbours.
     let along = |k: i32, f: f64| (1.0 - f) * weight(k) + f * weight(k - 1);
     let size = DVec2::from(map.resolution.map(f64::from));
     let mut sum = 0.0;
@@ -38,7 +40,8 @@ fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
     sum
 }
 
-/// Mean light beyond what the blur itself lets through, at points that truth has in full shadow; and the same only where the blur lets nothing through.
+/// For each statistic, the mean light beyond what the blur itself lets through, over all points
+/// that the truth has in full shadow, and over those of them where the blur lets nothing through.
 fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let tracer = Tracer::new(scene).unwrap();
     let v = scene.default_view();
@@ -85,13 +88,14 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     statistics.iter().map(of).collect()
 }
 
-/// As `csmM`, or as `csmM(offset,leak=0.15)`.
+/// The statistic of `csmM`, or of `csmM(offset,leak=0.15)`.
 fn csm(order: u32, is_offset: bool) -> Statistic {
     let csm = Csm::new(order, 0.0, is_offset, !is_offset).unwrap();
     Statistic::Csm(csm.with_leak(if is_offset { 0.15 } else { 0.1 }))
 }
 
-/// Under bars finer than the blur every point is half lit, and what leaks comes on top of that. The series is not doubled, which would brighten it.
+/// Under bars finer than the blur every point is half lit, and leaking light adds to that. The
+/// series is not doubled here, because doubling would brighten these points.
 #[test]
 fn a_fence_leaks_a_tenth_of_what_variance_does() {
     let scene = umbrage_scene::builtin("fence", None).unwrap();
@@ -101,7 +105,8 @@ fn a_fence_leaks_a_tenth_of_what_variance_does() {
     assert!(leaks[1] < 0.1 * leaks[0] && leaks[2] < 0.1 * leaks[0], "{leaks:?}");
 }
 
-/// Surfaces behind surfaces: where all that the blur sees lies in shadow.
+/// In a lattice, surfaces lie behind surfaces, so there are points where all that the blur covers
+/// is in shadow.
 #[test]
 fn a_lattice_leaks_a_tenth_of_what_variance_does() {
     let folder = std::env::var_os("UMBRAGE_SCENES").map_or_else(
@@ -118,7 +123,7 @@ fn a_lattice_leaks_a_tenth_of_what_variance_does() {
     assert!(dark[0] > 0.01, "nothing leaks: {dark:?}");
     assert!(dark[1] < 0.1 * dark[0] && dark[2] < 0.1 * dark[0], "{dark:?}");
 
-    // Rows of fences have no such place.
+    // Behind rows of fences there are no such points.
     let statistics = [Statistic::Vsm(Vsm::default()), csm(8, true), csm(16, true)];
     let rows = leaks(&load("lattice/fence_rows.glb"), &statistics);
     let rows: Vec<f64> = rows.into_iter().map(|[all, _]| all).collect();

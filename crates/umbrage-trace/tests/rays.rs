@@ -1,4 +1,4 @@
-//! Rays find what is there: nothing lost, nothing invented.
+//! Rays find exactly the triangles that are there, in agreement with a brute-force search.
 
 mod common;
 
@@ -10,7 +10,8 @@ use umbrage_trace::{Error, Ray, Tracer};
 
 const EVERYWHERE: [f64; 2] = [0.0, f64::INFINITY];
 
-/// Compares tree and brute force for one ray; `false` if rounding could decide either way.
+/// Compares the hierarchy with a brute-force search for one ray. Returns `false` if rounding could
+/// decide either way.
 fn agrees(tracer: &Tracer<'_>, ray: Ray, tolerance: f64) -> Result<bool, TestCaseError> {
     let hits = all_hits(tracer.scene(), ray);
     let found = tracer.closest(ray, EVERYWHERE);
@@ -29,14 +30,15 @@ fn agrees(tracer: &Tracer<'_>, ray: Ray, tolerance: f64) -> Result<bool, TestCas
         let along = ray.origin + ray.direction * hit.t;
         let error = tracer.position(&hit).distance(along);
         prop_assert!(error <= tolerance * (along.length() + t * ray.direction.length()));
-        // Any-hit over ranges that begin and end around the first hit.
+        // Any-hit queries over ranges that begin and end around the first hit.
         prop_assert!(!tracer.occluded(ray, [0.0, t * (1.0 - tolerance)]));
         prop_assert!(tracer.occluded(ray, [0.0, t * (1.0 + tolerance)]));
     }
     Ok(true)
 }
 
-/// A soup in one of several styles, at a scale from millimetres to thousands of kilometres.
+/// A triangle soup in one of several styles, at a scale from millimetres to thousands of
+/// kilometres.
 fn random_soup(random: &mut Random, count: usize) -> Vec<[Vec3; 3]> {
     let scale = 10f64.powf(random.between(-3.0, 6.0));
     let size = scale * 10f64.powf(random.between(-2.0, 0.0));
@@ -50,9 +52,10 @@ fn random_soup(random: &mut Random, count: usize) -> Vec<[Vec3; 3]> {
                 let mut corner = center + random.vector(size);
                 match style {
                     0 => {}
-                    // All in axis-aligned planes: boxes without thickness.
+                    // All triangles lie in axis-aligned planes, so that boxes have no thickness.
                     1 => corner.y = (corner.y / scale).round() * scale,
-                    // On a coarse lattice: shared corners, edges and planes.
+                    // All corners lie on a coarse lattice, so that triangles share corners, edges
+                    // and planes.
                     _ => corner = (corner / size).round() * size,
                 }
                 corner.as_vec3()
@@ -87,7 +90,8 @@ proptest! {
         let bounds = tracer.bounds();
         let mut clear = 0;
         for i in 0..60 {
-            // Aimed at a random point of the bounds, from outside, inside, or along an axis.
+            // Rays aim at a random point of the bounds, from outside, from inside, or along an
+            // axis.
             let target = bounds.min + bounds.size() * (random.vector(0.5) + 0.5);
             let origin = bounds.center() + random.direction() * bounds.size().length() * random.between(0.0, 3.0);
             let ray = match i % 3 {
@@ -125,7 +129,7 @@ proptest! {
 
 #[test]
 fn instances_equal_their_flattened_mesh() {
-    // Powers of two, quarter turns and small integers: flattening rounds nothing.
+    // Powers of two, quarter turns and small integers, so that flattening rounds nothing.
     let mut mesh = sphere(Vec3::ZERO, 1.0, 12);
     mesh.positions.iter_mut().for_each(|p| *p = (*p * 65536.0).round() / 65536.0);
     let turn = DMat3::from_cols(DVec3::Z, DVec3::Y, -DVec3::X);
@@ -172,7 +176,7 @@ fn instances_equal_their_flattened_mesh() {
 
 #[test]
 fn a_mesh_drawn_often_is_stored_once() {
-    // 5 million triangles drawn: would take gigabytes and minutes if they were copied.
+    // 5 million triangles are drawn. Copies of them would take gigabytes and minutes.
     let place = |i| at(f64::from(i % 20) * 3.0, 0.0, f64::from(i / 20) * 3.0);
     let places: Vec<_> = (0..400).map(|i| (0, place(i))).collect();
     let scene = scene(vec![sphere(Vec3::ZERO, 1.0, 56)], &places);
@@ -184,7 +188,7 @@ fn a_mesh_drawn_often_is_stored_once() {
 
 #[test]
 fn closed_meshes_are_watertight() {
-    // Every ray from inside hits, also those aimed exactly at corners and along edges.
+    // Every ray from inside must hit, also rays aimed exactly at corners and along edges.
     for (radius, center) in [(1.0, Vec3::ZERO), (3e4, Vec3::new(1e5, 0.0, 7.0)), (1e-3, Vec3::X)] {
         let mesh = sphere(center, radius, 40);
         let scene = scene(vec![mesh.clone()], &[(0, DAffine3::IDENTITY)]);
@@ -209,7 +213,7 @@ fn closed_meshes_are_watertight() {
 
 #[test]
 fn grid_lines_are_watertight() {
-    // Rays along the axes through the lattice that a flat, finely divided sheet is made of.
+    // Rays run along the axes through the lattice points of a flat, finely divided sheet.
     let n = 32;
     let corner = |i: u32, j: u32| Vec3::new(i as f32 * 0.1, 0.0, j as f32 * 0.1);
     let mut mesh = umbrage_scene::Mesh::default();
@@ -235,7 +239,7 @@ fn grid_lines_are_watertight() {
 
 #[test]
 fn masks_cut_holes() {
-    // Opaque left half, transparent right half, seen through and casting so.
+    // The left half is opaque and the right half transparent, both to the eye and to light.
     let mut scene = scene(vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)], &[(0, at(5.0, 1.0, 0.0))]);
     scene.textures.push(Texture {
         size: [2, 1],
@@ -258,7 +262,7 @@ fn masks_cut_holes() {
     let tracer = tracer.opaque(true);
     assert!(is_there(&tracer, 5.3) && is_there(&tracer, 5.7));
 
-    // What lies behind a hole is seen through it.
+    // Surfaces behind a hole are seen through the hole.
     let mut below = ground(10.0);
     below.material = 1;
     scene.materials.push(common::plain());
@@ -267,7 +271,7 @@ fn masks_cut_holes() {
     let tracer = Tracer::new(&scene).unwrap();
     assert_eq!(common::below(&tracer, DVec3::new(5.7, 3.0, 0.4)).primitive.instance, 1);
     assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).primitive.instance, 0);
-    // Without texture coordinates the factor alone decides.
+    // Without texture coordinates, the factor alone decides.
     scene.meshes[0].uvs = Vec::new();
     scene.materials[0].base_color.w = 0.4;
     let tracer = Tracer::new(&scene).unwrap();
@@ -308,13 +312,13 @@ fn rays_that_are_none_hit_nothing() {
     }
     let ray = Ray { origin: up, direction: -DVec3::Y };
     assert_eq!(tracer.closest(ray, [1.0, 1.5]).map(|h| h.t), Some(1.0));
-    // However short or long its direction.
+    // Directions may be extremely short or long.
     for scale in [1e-200, 1e200] {
         let ray = Ray { origin: up, direction: -DVec3::Y * scale };
         let hit = tracer.closest(ray, EVERYWHERE).unwrap();
         assert!((hit.t * scale - 1.0).abs() < 1e-12, "{hit:?}");
     }
-    // From either side, and backwards along an unbounded line.
+    // A triangle is hit from either side, and also backwards along an unbounded line.
     let from_below = Ray { origin: -up, direction: DVec3::Y };
     assert!(tracer.occluded(from_below, EVERYWHERE));
     let above = Ray { origin: up, direction: DVec3::Y };

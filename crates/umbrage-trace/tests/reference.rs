@@ -1,4 +1,4 @@
-//! Plans, executed by rays, against closed forms and the truth.
+//! Plans executed by ray tracing, against closed forms and the truth.
 
 mod common;
 
@@ -12,7 +12,7 @@ use umbrage_scene::closed_form::pole_shadows;
 use umbrage_scene::{Scene, builtin};
 use umbrage_trace::{DepthMap, Error, Reference, Surface, Tracer, View};
 
-/// How texels are spread, and over what.
+/// Techniques: how texels are spread, and over what.
 const SPREADS: [&str; 9] = [
     "unfocused",
     "uniform",
@@ -44,7 +44,7 @@ fn lookup(plan: &Plan, depths: &DepthMap, filter: Filter, surface: &Surface) -> 
     visibility(&plan.maps[0], filter, &receiver, |i, j| depths.texel(i, j))
 }
 
-/// The shares of facing samples that are lit but should be dark, and the other way round.
+/// The share of facing samples that are lit but should be dark, and the share of the opposite.
 fn wrong(view: &View<'_>, plan: &Plan) -> [f64; 2] {
     let reference = Reference::render(view.tracer(), plan, &nobody).unwrap();
     let band = view.band(0..view.camera().image()[1], &nobody);
@@ -61,7 +61,8 @@ fn wrong(view: &View<'_>, plan: &Plan) -> [f64; 2] {
 
 #[test]
 fn depths_are_those_of_the_first_hit() {
-    // Two sheets over ground; light straight down, depth 0 at y = 4, depth 1 at y = −4.
+    // Two sheets over ground. Light falls straight down, with depth 0 at y = 4 and depth 1 at y =
+    // −4.
     let scene = scene(
         vec![
             ground(2.0),
@@ -87,7 +88,7 @@ fn depths_are_those_of_the_first_hit() {
     assert_eq!(at(0.55, 0.55), 0.25, "a sheet over it");
     assert_eq!(at(0.55, -0.55), 0.0, "a sheet beyond the near end is flattened onto it");
     assert_eq!(at(2.55, 0.55), 1.0, "nothing");
-    // The ground below the far end is beyond what matters.
+    // The ground lies below the far end of the depth range, so it is clamped to 1.
     let upper = even_map(DVec3::Y * 40.0, -DVec3::Y, 3.0, 4.0, [8, 8]);
     let depths = DepthMap::render(&tracer, &upper, 0, &nobody).unwrap();
     assert_eq!(depths.texel(4, 4), 1.0);
@@ -98,7 +99,7 @@ fn the_gutter_continues_the_map() {
     let scene = builtin("pole", None).unwrap();
     let tracer = Tracer::new(&scene).unwrap();
     let map = even_map(DVec3::new(0.1, 1.0, 0.2), DVec3::new(1.0, -1.0, 0.5), 2.0, 9.0, [16, 32]);
-    // The same texels as the middle of a larger map.
+    // The gutter has the texels that surround the same map in the middle of a larger map.
     let mut larger = even_map(map.origin, DVec3::new(1.0, -1.0, 0.5), 4.0, 9.0, [32, 64]);
     larger.shadow_from_local.w_axis = map.shadow_from_local.w_axis;
     let larger = DepthMap::render(&tracer, &larger, 0, &nobody).unwrap();
@@ -121,13 +122,13 @@ fn empty_and_absurd_maps() {
     map.resolution = [u32::MAX; 2];
     let error = DepthMap::render(&tracer, &map, 0, &nobody).unwrap_err();
     assert_eq!(error, Error::Memory { resolution: [u32::MAX; 2] });
-    // A camera that sees nothing: an empty plan, all is lit.
+    // A camera that sees no receivers gets an empty plan, under which all is lit.
     let away = camera(DVec3::Y * 50.0, DVec3::Y * 51.0, [8, 8]);
     let light = Light::Directional { direction: -DVec3::Y };
     let plan = plan(&away, &light, &tracer, "uniform", 64);
     let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
     assert_eq!(reference.texel(0, DVec3::ZERO), None);
-    // A scene without triangles.
+    // A scene without triangles gives depth 1 everywhere.
     let nothing = Scene::default();
     let tracer = Tracer::new(&nothing).unwrap();
     map.resolution = [4, 4];
@@ -136,7 +137,7 @@ fn empty_and_absurd_maps() {
 
 #[test]
 fn planes_have_no_acne_at_any_angle() {
-    // Tilted ground far from the origin, light from 90° down to 1° above it, every filter.
+    // Tilted ground far from the origin, in light from 90° down to 1° above it, under every filter.
     let mut random = Random(77);
     for round in 0..12 {
         let tilt = DMat3::from_axis_angle(random.direction(), random.between(0.0, 3.0));
@@ -182,7 +183,7 @@ fn shadows_end_within_a_texel_of_where_they_should() {
         let point = DVec3::new(at.x + 1.0, -1.0, at.y + 0.5);
         let surface = towards(&tracer, point, DVec3::Y);
         let expected = pole_shadows(surface.position, travel);
-        // Texels are this wide on the ground, at most (light falls at 42°).
+        // The largest width of a texel on the ground; light falls at 42°.
         let reach = |n: f64| 0.5 * n * texel * 2f64.sqrt() / 0.66;
         let is_clear = |margin: f64| {
             (0..16).all(|k| {
@@ -192,7 +193,7 @@ fn shadows_end_within_a_texel_of_where_they_should() {
             })
         };
         for (filter, width) in [(Filter::Hard, 1.0), (Filter::Pcf { n: 2 }, 3.0)] {
-            // At the pole's foot the ground's slope allows for some leaking.
+            // At the pole's foot the slope of the ground allows some light to leak.
             let at_foot = surface.position.abs().max_element() < 0.1 + 2.0 * texel;
             if is_clear(reach(width)) && !at_foot {
                 counts[usize::from(expected)] += 1;
@@ -241,14 +242,16 @@ fn all_sides_of_a_point_light_approach_the_truth() {
     let tracer = Tracer::new(&scene).unwrap();
     let light = scene.lights[0].light;
     let Light::Point(flame) = light else { panic!("{light:?}") };
-    // From opposite corners, up and down past the lantern: all that it shines on is seen.
+    // The views lie at opposite corners, one looking up and one down past the lantern. Together
+    // they see all surfaces that it lights.
     let views = [([-2.6, 0.3, 2.6], 3.5), ([2.6, 4.3, -2.6], 1.0)];
     let cameras = views.map(|(eye, height)| {
         let look = camera(DVec3::from(eye), DVec3::Y * height, [160, 120]);
         look.with_depth_range(0.2, 20.0).unwrap()
     });
     for spread in SPREADS {
-        // For each side of the cube: samples, and those wrong with few texels and with many.
+        // For each side of the cube: the number of samples, of those wrong with few texels, and of
+        // those wrong with many.
         let mut counts = [[0; 3]; 6];
         for camera in &cameras {
             let view = View::new(&tracer, *camera, light, 1).unwrap();
@@ -281,7 +284,7 @@ fn all_sides_of_a_point_light_approach_the_truth() {
 
 #[test]
 fn flat_ground_is_lit_under_every_plan() {
-    // Whatever camera, light and warp: nothing casts, so nothing is dark.
+    // Nothing casts, so nothing may be dark, whatever the camera, light and warp.
     let mut random = Random(31);
     let scene = scene(vec![ground(50.0)], &[(0, at(0.0, 0.0, 0.0))]);
     let tracer = Tracer::new(&scene).unwrap();
@@ -299,7 +302,7 @@ fn flat_ground_is_lit_under_every_plan() {
         let spread = SPREADS[round % SPREADS.len()];
         let plan = plan(&look, &light, &tracer, spread, 64 * 64);
         for filter in filters() {
-            // What is drawn beyond the map's border is the filter's own affair.
+            // Each filter draws the gutter that it needs.
             let plan = Plan { filter, ..plan.clone() };
             let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
             for sample in band.samples().iter().flatten().filter(|s| s.depth < 79.9) {
@@ -314,7 +317,7 @@ fn flat_ground_is_lit_under_every_plan() {
 
 #[test]
 fn a_plane_is_lit_all_around_a_point_light() {
-    // Nothing casts, so nothing is dark, least of all where sides of the cube meet.
+    // Nothing casts, so nothing may be dark, in particular not where sides of the cube meet.
     let mut random = Random(33);
     let mut sides = [0; 6];
     for round in 0..60 {
@@ -336,7 +339,7 @@ fn a_plane_is_lit_all_around_a_point_light() {
         let spread = SPREADS[round % SPREADS.len()];
         let plan = sized(&look, &light, &tracer, spread, Size::Exact([24, 24]));
         for filter in filters() {
-            // What is drawn beyond the map's border is the filter's own affair.
+            // Each filter draws the gutter that it needs.
             let plan = Plan { filter, ..plan.clone() };
             let reference = Reference::render(&tracer, &plan, &nobody).unwrap();
             let facing = band.samples().iter().flatten().filter(|s| s.is_facing && s.depth < 39.9);

@@ -1,4 +1,4 @@
-//! Real scenes, from the folder that `UMBRAGE_SCENES` names.
+//! Rays in real scenes, from the folder that `UMBRAGE_SCENES` names.
 
 mod common;
 
@@ -36,7 +36,8 @@ fn no_hit_is_lost_in_real_scenes() {
             let found = tracer.closest(ray, [0.0, f64::INFINITY]);
             assert!(found.is_some() || hits.iter().all(|h| h.2 < 1e-6), "{name}: {ray:?}");
             let (Some(found), Some(&(t, _, margin))) = (found, hits.first()) else { continue };
-            // Real scenes repeat triangles: compare where, not which.
+            // Real scenes repeat triangles, so only the distance can be compared, not which
+            // triangle is hit.
             if margin > 1e-6 {
                 clear += 1;
                 assert!((found.t - t).abs() < 1e-9 * t.max(1.0), "{name}: {ray:?} {t} {found:?}");
@@ -48,8 +49,8 @@ fn no_hit_is_lost_in_real_scenes() {
 
 #[test]
 fn a_real_level_comes_out_right() {
-    // 2048² texels on a view of cars and stands, masks ignored. Engines of 2026 with four cascades
-    // of 1024² and their own biases have 3.9% of the pixels wrong here.
+    // 2048² texels on a view of cars and stands, with alpha masks ignored. Engines of 2026 with
+    // four cascades of 1024² and their own biases have 3.9% of the pixels wrong here.
     let scene = load("vehicles/kenney_racing_level.glb");
     let tracer = Tracer::new(&scene).unwrap().opaque(true);
     let camera = Camera::look_at(LookAt {

@@ -1,4 +1,4 @@
-//! [`View::sees`]: what one view shows, as another sees it.
+//! [`View::sees`]: points that one view shows, as seen by another view.
 
 mod common;
 
@@ -11,7 +11,7 @@ use umbrage_trace::{Ray, Sample, Surface, Tracer, View};
 const IMAGE: [u32; 2] = [48, 36];
 const FOV_Y_RAD: f64 = 1.0;
 
-/// Balls, some of them in one another, and loose triangles over a ground.
+/// Spheres, some of which intersect, and loose triangles over a ground.
 fn clutter() -> Scene {
     let mut random = Random(5);
     let mut leaf = || {
@@ -35,7 +35,7 @@ fn samples(view: &View<'_>) -> Vec<Sample> {
     view.band(0..IMAGE[1], &nobody).samples().iter().flatten().copied().collect()
 }
 
-/// Why a point is not seen.
+/// Why a view does not see a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Why {
     Behind,
@@ -45,8 +45,8 @@ enum Why {
     Hidden,
 }
 
-/// Whether a view sees a point of a surface that was seen from `first_eye`, by brute force over all
-/// triangles; `None` where rounding decides.
+/// Whether a view sees a point of a surface that was seen from `first_eye`, found by brute force
+/// over all triangles; `None` where rounding decides.
 fn seen(
     scene: &Scene,
     look: &LookAt,
@@ -61,7 +61,7 @@ fn seen(
     let half_height = depth * (FOV_Y_RAD / 2.0).tan();
     let half_width = half_height * f64::from(IMAGE[0]) / f64::from(IMAGE[1]);
     let inside = (half_width - to.dot(right).abs()).min(half_height - to.dot(up).abs());
-    // Both eyes on the same side of the triangle's plane.
+    // The second eye sees the point only if both eyes are on the same side of the triangle's plane.
     let instance = &scene.instances[surface.primitive.instance as usize];
     let mesh = &scene.meshes[instance.mesh];
     let [a, b, c] = mesh.triangles[surface.primitive.triangle as usize]
@@ -115,20 +115,20 @@ fn agrees_with_brute_force_wherever_the_viewer_goes() {
             counts[expected.map_or_else(|why| why as usize, |_| 5)] += 1;
             let (Some(found), Ok(depth)) = (found, expected) else { continue };
             assert!((found.depth - depth).abs() < 1e-9 * depth, "{} {depth}", found.depth);
-            // The point itself; and the sun shines on it as it did before.
+            // The view returns the same point, which faces the sun as before.
             assert_eq!((found.surface, found.is_facing), (*surface, sample.is_facing));
-            // The view's own sample there.
+            // The view's own sample at that pixel is the same point.
             let pixel = second_view.camera().pixel(surface.position).unwrap();
             let own = second_view.sample(pixel).unwrap();
             assert!(own.surface.position.distance(surface.position) < 1e-6, "{own:?} {surface:?}");
         }
     }
-    // Each of the reasons, and none, many times.
+    // Each of the reasons, and no reason at all, occurs many times.
     assert!(counts.iter().all(|&n| n > 150), "{counts:?}");
 }
 
-/// Whether a point faces a light is for the view that is asked to say, by its own light: a sun that has
-/// moved on, a torch whose cone is elsewhere.
+/// The light of the view that is asked decides whether a point faces the light: the sun may have
+/// moved, or a spot light's cone may point elsewhere.
 #[test]
 fn facing_is_by_the_light_of_the_view_that_is_asked() {
     let scene = clutter();
@@ -158,7 +158,7 @@ fn facing_is_by_the_light_of_the_view_that_is_asked() {
     }
 }
 
-/// A view sees all that it shows, to the last pixel, and what lies beyond its far distance too.
+/// A view sees all that it shows, up to the last pixel, and also what lies beyond its far distance.
 #[test]
 fn a_view_sees_what_it_shows() {
     let scene = clutter();

@@ -1,4 +1,4 @@
-//! The truth against closed forms, and its own robustness: no surface shadows itself.
+//! The truth against closed forms, and its robustness: no surface shadows itself.
 
 mod common;
 
@@ -15,7 +15,8 @@ fn sun_is_hidden(tracer: &Tracer<'_>, surface: &Surface, travel: DVec3) -> bool 
     tracer.occluded_from(surface, -travel, f64::INFINITY)
 }
 
-/// Ground points at random, and light from all over the sky down to 2° above the horizon.
+/// Calls `check` with random points of the ground and with light from all over the sky, down to 2°
+/// above the horizon.
 fn for_ground_points(
     scene: &Scene,
     count: usize,
@@ -28,10 +29,10 @@ fn for_ground_points(
         let azimuth = random.between(0.0, std::f64::consts::TAU);
         let (sin, cos) = elevation.sin_cos();
         let travel = DVec3::new(cos * azimuth.cos(), -sin, cos * azimuth.sin());
-        // Near the shadow: up to the caster's size around where its middle falls.
+        // The points lie near the shadow: up to the caster's size from the shadow of its middle.
         let middle = DVec2::new(travel.x, travel.z) * (2.0 / sin * random.unit());
         let at = (middle + random.in_square(2.0)).clamp(DVec2::splat(-19.9), DVec2::splat(19.9));
-        // From below, where nothing hides the ground.
+        // The ground is found from below, where nothing hides it.
         let surface = towards(&tracer, DVec3::new(at.x, -1.0, at.y), DVec3::Y);
         assert_eq!(surface.position.y, 0.0);
         check(&tracer, &surface, travel);
@@ -52,7 +53,8 @@ fn the_shadow_of_a_pole_ends_where_it_should() {
 
 #[test]
 fn the_outline_of_a_shadow_is_sharp_to_the_last_bits() {
-    // A ground point's last bits decide: step over the outline of the pole's shadow by 10⁻¹³ m.
+    // The last bits of a ground point decide: the points lie 10⁻¹³ m to either side of the outline
+    // of the pole's shadow.
     let scene = builtin("pole", None).unwrap();
     let tracer = Tracer::new(&scene).unwrap();
     let travel = DVec3::new(1.0, -0.5, 0.0);
@@ -61,13 +63,14 @@ fn the_outline_of_a_shadow_is_sharp_to_the_last_bits() {
         assert!((surface.position.x - x).abs() < 1e-14);
         sun_is_hidden(&tracer, &surface, travel)
     };
-    // Stored in single precision, the half-width is not quite 0.1.
+    // The scene stores the half-width in single precision, where it is not quite 0.1.
     let half = f64::from(0.1f32);
     for sign in [-1.0, 1.0] {
         assert!(on_ground(1.0, sign * (half - 1e-13)));
         assert!(!on_ground(1.0, sign * (half + 1e-13)));
     }
-    // The tip: 4 m high, at a slope of ½, 8 m behind the far upper edge.
+    // The tip of the shadow: the pole is 4 m high and the light falls with a slope of ½, so the tip
+    // lies 8 m behind the far upper edge.
     assert!(on_ground(8.0 + half - 1e-12, 0.01));
     assert!(!on_ground(8.0 + half + 1e-12, 0.01));
 }
@@ -88,14 +91,15 @@ fn light_falls_through_a_slit() {
 fn the_shadow_of_a_sphere_is_an_ellipse() {
     let rings = 200;
     let scene = builtin("sphere", Some(rings)).unwrap();
-    // The tessellation is inscribed: its shadow is smaller by up to this, across the light.
+    // The tessellated sphere is inscribed in the ideal one. Across the light, its shadow is smaller
+    // by up to this length.
     let sagitta = SPHERE_RADIUS * (std::f64::consts::FRAC_PI_2 / f64::from(rings)).powi(2);
     let [mut dark, mut between] = [0, 0];
     for_ground_points(&scene, 20_000, |tracer, surface, travel| {
         let is_hidden = sun_is_hidden(tracer, surface, travel);
         dark += usize::from(is_hidden);
         let ideal = sphere_shadows(surface.position, travel);
-        // The same test for a sphere smaller by the sagitta, around the same centre.
+        // The same test for a sphere that is smaller by the sagitta, around the same centre.
         let smaller = (SPHERE_CENTER - surface.position).cross(travel.normalize()).length()
             <= SPHERE_RADIUS - 1.1 * sagitta;
         between += usize::from(ideal != smaller);
@@ -105,7 +109,8 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
     assert!(dark > 1000 && between < 100, "{dark} {between}");
 }
 
-/// The share of samples in a picture of nothing but lit surfaces that are in the dark.
+/// In a picture of surfaces that are all lit, the number of samples that are in shadow, and the
+/// number of all samples.
 fn false_shadows(scene: &Scene, eye: DVec3, target: DVec3, light: Light) -> (usize, usize) {
     let tracer = Tracer::new(scene).unwrap();
     let view = View::new(&tracer, camera(eye, target, [160, 120]), light, 1).unwrap();
@@ -117,7 +122,8 @@ fn false_shadows(scene: &Scene, eye: DVec3, target: DVec3, light: Light) -> (usi
 
 #[test]
 fn planes_do_not_shadow_themselves() {
-    // At all light angles down to 0.01°, tilted, finely divided, from 1 mm to 100 km, and there.
+    // Tilted, finely divided planes from 1 mm to 100 km wide, near the origin and up to 100 km from
+    // it, at light angles down to 0.01°.
     let mut random = Random(5);
     for round in 0..16 {
         let scale = 10f64.powf(random.between(-3.0, 5.0));
@@ -143,7 +149,8 @@ fn planes_do_not_shadow_themselves() {
             let (sin, cos) = elevation_deg.to_radians().sin_cos();
             let direction = -(normal * sin + along * cos);
             let light = Light::Directional { direction };
-            // Rounding the corners to f32 makes the plane uneven by 2⁻²⁴: invisible at 1°.
+            // Rounding the corners to single precision makes the plane uneven by 2⁻²⁴, which does
+            // not show at 1°.
             let (wrong, all) = false_shadows(&scene, eye, offset, light);
             assert!(
                 all > 3000 && wrong == 0,
@@ -162,7 +169,7 @@ fn copies_and_decals_do_not_shadow_what_they_lie_on() {
         ..mesh.clone()
     };
     let floor = turned(&ground(3.0));
-    // The same plane in other triangles, whose corners round otherwise.
+    // The same plane made of other triangles, whose corners round differently.
     let decal = turned(&sheet(Vec3::new(-1.3, 0.0, -0.9), Vec3::Z * 2.1, Vec3::X * 1.7));
     let mut backwards = floor.clone();
     backwards.triangles.iter_mut().for_each(|t| t.reverse());
@@ -200,7 +207,7 @@ fn what_is_near_but_apart_casts() {
 
 #[test]
 fn a_box_shadows_up_to_its_very_foot() {
-    // A wall meets the floor, as one mesh and as two: no light leaks in where they meet.
+    // A wall meets the floor, as one mesh and as two. No light may leak in where they meet.
     let wall = |x: f32| sheet(Vec3::new(x, 0.0, -3.0), Vec3::Z * 6.0, Vec3::Y * 2.0);
     let scene =
         scene(vec![ground(3.0), wall(0.3)], &[(0, at(7.1, 0.2, 0.0)), (1, at(7.1, 0.2, 0.0))]);
@@ -217,7 +224,7 @@ fn a_box_shadows_up_to_its_very_foot() {
 
 #[test]
 fn curved_shells_do_not_leak() {
-    // Inside a closed sphere no light arrives, wherever one stands on its triangles.
+    // No light arrives inside a closed sphere, wherever on its triangles the point lies.
     let scene =
         scene(vec![common::sphere(Vec3::new(3.0, 1.0, 2.0), 1.0, 24)], &[(0, DAffine3::IDENTITY)]);
     let tracer = Tracer::new(&scene).unwrap();
@@ -226,7 +233,8 @@ fn curved_shells_do_not_leak() {
         let center = DVec3::new(3.0, 1.0, 2.0);
         let surface = towards(&tracer, center, random.direction());
         let to_light = random.direction();
-        // Seen from inside, the normal turns inwards: facing means the light shines through the shell.
+        // Seen from inside, the normal turns inwards, so a facing point is one that light could
+        // only reach through the shell.
         if surface.geometric_normal.dot(to_light) > 1e-3 {
             assert!(
                 tracer.occluded_from(&surface, to_light, f64::INFINITY),
@@ -263,7 +271,7 @@ fn spot_lights_end_at_cone_and_range_and_begin_at_near() {
             range,
         })
     };
-    // Seen from below, the ground's lower side faces away from a light above it.
+    // Seen from below, the lower side of the ground faces away from a light above it.
     assert_eq!(seen(&tracer, spot(0.1, 50.0), DVec3::new(5.0, -3.0, 0.0)), (false, 0.0));
     let above = |light, x| seen(&tracer, light, DVec3::new(x, 3.0, 0.0));
     assert_eq!(above(spot(0.1, 50.0), 5.0), (true, 1.0));
@@ -298,12 +306,13 @@ fn point_lights_end_at_a_sphere_and_begin_at_a_cube() {
     assert_eq!(lit(point(0.1, 50.0), 1.01, 0.0), (true, 1.0), "beside it");
     let below = seen(&tracer, point(0.1, 50.0), DVec3::new(5.0, -3.0, 0.0));
     assert_eq!(below, (false, 0.0), "the ground's other side");
-    // 10² + 10² + 5² = 15².
+    // The distance is 15 m, because 10² + 10² + 5² = 15².
     assert!(lit(point(0.1, 15.0 + 1e-9), 10.0, 5.0).0);
     assert!(!lit(point(0.1, 15.0 - 1e-9), 10.0, 5.0).0, "beyond the range");
     assert_eq!(lit(point(6.0, 50.0), 0.5, 0.0), (true, 0.0), "a caster nearer than near");
     assert_eq!(lit(point(10.01, 50.0), 0.5, 0.0), (true, 1.0), "a receiver nearer than near");
-    // Along the nearest axis it is farther than 12 m away, along that to the ground it is not.
+    // `near` counts along the axis nearest to the direction of the point. This point is farther
+    // than 12 m from the light, but only 11.99 m along that axis.
     assert_eq!(lit(point(12.0, 50.0), 0.5, 11.99), (true, 1.0));
     let above = |x: f64| {
         let eye = DVec3::new(x, 16.0, 0.0);
@@ -316,11 +325,12 @@ fn point_lights_end_at_a_sphere_and_begin_at_a_cube() {
     assert_eq!([above(0.99), above(1.01)], [(true, 0.0), (true, 1.0)], "upwards, too");
 }
 
-/// Whether a ground point is dark in the light of a lamp, whose range and facing are not asked for.
+/// Whether a ground point is in the shadow of a point light. The point's facing is not tested, nor
+/// the light's range.
 fn lamp_is_hidden(tracer: &Tracer<'_>, at: DVec2, position: DVec3) -> bool {
     let light = Light::Point(PointLight { position, near: 1e-9, range: 1e9 });
     let view = View::new(tracer, camera(DVec3::Y, DVec3::ZERO, [1, 1]), light, 1).unwrap();
-    // From below, where nothing hides the ground.
+    // The ground is found from below, where nothing hides it.
     let surface = towards(tracer, DVec3::new(at.x, -1.0, at.y), DVec3::Y);
     assert_eq!(surface.position.y, 0.0);
     view.truth(&Sample { surface, depth: 1.0, is_facing: true }) == 0.0
@@ -331,22 +341,25 @@ fn the_shadow_of_a_pole_widens_away_from_a_lamp() {
     let scene = builtin("pole", None).unwrap();
     let tracer = Tracer::new(&scene).unwrap();
     let half = f64::from(0.1f32);
-    // Whichever way the lamp lies of the pole, on each side of the cube around it.
+    // The light lies on each of the four sides of the pole, and the ground on each side of the
+    // light's cube.
     for quarter in 0..4 {
         let turned = DMat3::from_rotation_y(f64::from(quarter) * std::f64::consts::FRAC_PI_2);
-        // Single precision is enough for the turn: outlines are stepped over by more.
+        // Single precision suffices for the rotation, because the points lie farther than its error
+        // from the outline.
         let is_hidden = |x: f64, z: f64, lamp: DVec3| {
             let p = turned * DVec3::new(x, 0.0, z);
             lamp_is_hidden(&tracer, DVec2::new(p.x, p.z), turned * lamp)
         };
         for lamp in [DVec3::new(-3.0, 6.0, 0.0), DVec3::new(-3.0, 4.5, 0.0)] {
-            // The light that passes over the far upper edge falls by 1 m on (3 + half) / (height − 4).
+            // The light that passes over the far upper edge falls by 1 m over (3 + half) / (height
+            // − 4).
             let tip = half + POLE_HEIGHT * (half - lamp.x) / (lamp.y - POLE_HEIGHT);
             if tip < 19.0 {
                 assert!(is_hidden(tip - 1e-11, 0.01, lamp));
                 assert!(!is_hidden(tip + 1e-11, 0.01, lamp));
             }
-            // Past its sides light passes at the two near edges, x = −half and z = ±half.
+            // Light passes the pole's sides at the two near edges, x = −half and z = ±half.
             for x in [0.5, 2.0, 5.0] {
                 let side = half * (x - lamp.x) / (-half - lamp.x);
                 for sign in [-1.0, 1.0] {
@@ -374,7 +387,7 @@ fn the_shadow_of_a_sphere_is_what_lies_in_the_cone_behind_it() {
         let half = if random.unit() < 0.5 { 4.0 } else { 19.9 };
         let at = random.in_square(half);
         let point = DVec3::new(at.x, 0.0, at.y);
-        // How near the light passes to the sphere's middle.
+        // The distance at which the light passes the sphere's centre.
         let to_lamp = lamp - point;
         let along = (SPHERE_CENTER - point).dot(to_lamp) / to_lamp.length_squared();
         let miss = (point + to_lamp * along.clamp(0.0, 1.0)).distance(SPHERE_CENTER);
@@ -411,10 +424,10 @@ fn pictures_come_in_bands_and_the_same_on_any_number_of_threads() {
     let (samples, truth) = whole(1);
     assert_eq!((samples.clone(), truth.clone()), whole(3));
     assert_eq!(samples.len(), 60 * 40 * 9);
-    // The same in pieces, with a last one that hangs over the picture's edge.
+    // The same samples in bands, of which the last extends beyond the picture's end.
     let pieces = [0..7, 7..33, 33..99].map(|rows| view.band(rows, &nobody));
     assert_eq!(pieces.iter().flat_map(Band::samples).copied().collect::<Vec<_>>(), samples);
-    // Bands cover every row once, however large the picture.
+    // Bands cover every row once, however large the picture is.
     let wide = common::camera(DVec3::Z, DVec3::ZERO, [65536, 999]);
     let view = View::new(&tracer, wide, light, 64).unwrap();
     let rows: Vec<u32> = view.bands().flatten().collect();
@@ -425,7 +438,7 @@ fn pictures_come_in_bands_and_the_same_on_any_number_of_threads() {
 
 #[test]
 fn a_soup_of_slivers_is_survived() {
-    // Needles a micrometre wide, and one so flat that its normal is mostly rounding.
+    // Needles a micrometre wide, one of them so flat that its normal is mostly rounding error.
     let needles: Vec<_> = (0..100)
         .map(|i| {
             let x = i as f32 * 0.01;

@@ -1,4 +1,4 @@
-//! A filter's width is what it was told to be, near and far, under any warp and in every slice.
+//! A filter's kernel has the requested width, near and far, under any warp and in every slice.
 
 mod common;
 
@@ -9,9 +9,10 @@ use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use umbrage::{Camera, Light, LookAt, Objective, Partition, Size, Technique, Warp};
 use umbrage_trace::{Reference, Tracer, View};
 
-/// Light that falls a little sideways onto the ground, past the straight edge of a sheet 3 m above it.
+/// Direction of light that falls slightly sideways onto the ground, past the straight edge of a
+/// sheet 3 m above it.
 const LIGHT: DVec3 = DVec3::new(0.2, -1.0, 0.0);
-/// Where the edge's shadow lies.
+/// x at which the shadow of the edge lies.
 const EDGE_X: f64 = 0.6;
 
 fn camera() -> Camera {
@@ -27,7 +28,8 @@ fn camera() -> Camera {
     .unwrap()
 }
 
-/// How far apart visibility passes 10% and 90% on the ground, at some distances along the edge: in metres across the light, and in pixels across the edge.
+/// The distance between the points of the ground with visibility 10% and 90%, at several distances
+/// from the viewer: in metres across the light, and in pixels across the edge.
 fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
     let over = sheet(Vec3::new(-50.0, 3.0, -60.0), Vec3::Z * 120.0, Vec3::X * 50.0);
     let scene =
@@ -62,7 +64,7 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
             let edge = (pixel(EDGE_X, z + 0.01) - pixel(EDGE_X, z - 0.01)).normalize();
             Ramp {
                 distance: 20.0 - z,
-                // Across the light the ground is foreshortened.
+                // Measured across the light, the ground is foreshortened.
                 metres: (end - begin) * LIGHT.normalize().y.abs(),
                 pixels: edge.perp_dot(pixel(end, z) - pixel(begin, z)).abs(),
             }
@@ -70,10 +72,10 @@ fn ramps(filter: Filter, warp: Warp, slices: u32) -> Vec<Ramp> {
         .collect()
 }
 
-/// A penumbra.
+/// Width of the penumbra at one distance from the viewer.
 #[derive(Debug)]
 struct Ramp {
-    /// From the viewer, metres along the edge.
+    /// Distance from the viewer along the edge, metres.
     distance: f64,
     metres: f64,
     pixels: f64,
@@ -86,18 +88,19 @@ const TECHNIQUES: [(Warp, u32); 4] = [
     (Warp::Psm, 1),
 ];
 
-/// Linear in what it filters.
+/// A statistic that is linear in what it filters, so that the penumbra has the profile of the
+/// kernel.
 fn csm(width: Width) -> Filter {
     let statistic = Statistic::Csm(Csm::new(16, 0.0, true, false).unwrap());
     Filter::Prefiltered(Prefilter { statistic, blur: Blur::Width(width), half: false })
 }
 
-/// A Gaussian rises from 10% to 90% over so many standard deviations.
+/// A Gaussian rises from 10% to 90% over this many standard deviations.
 const RISE: f64 = 2.0 * 1.2816;
 
 #[test]
 fn comparisons_are_as_wide_as_told_everywhere() {
-    // A box rises from 10% to 90% over 0.8 of its width.
+    // The mean over a box rises from 10% to 90% over 0.8 of the box's width.
     let filter = Filter::Spread { n: 15, width: Width::Metres(1.2), pattern: Pattern::Grid };
     for (warp, slices) in TECHNIQUES {
         for ramp in ramps(filter, warp, slices) {
@@ -120,7 +123,8 @@ fn numbers_are_as_wide_as_told_everywhere() {
 #[test]
 fn pixels_are_those_of_the_picture() {
     for (warp, slices) in TECHNIQUES {
-        // Farther away the ground is seen at less than a sixteenth, and counts as if at that.
+        // Farther away the viewer sees the ground at an angle whose sine is below a sixteenth. A
+        // width in pixels counts there as it does at a sixteenth.
         let ramps = ramps(csm(Width::Pixels(16.0)), warp, slices);
         for ramp in ramps.into_iter().filter(|r| r.distance < 40.0) {
             let ratio = ramp.pixels / (RISE * Prefilter::DEVIATION * 16.0);
@@ -129,19 +133,24 @@ fn pixels_are_those_of_the_picture() {
     }
 }
 
-/// Under a disc of light the penumbra is as wide as the light, seen from the edge that casts it. (Far from the viewer texels of a perspective shadow map are as
-/// wide as that.)
+/// Under a disc of light, the penumbra is as wide as the light's disc projected through the edge
+/// that casts it. (Far from the viewer, the texels of a perspective shadow map are as wide as the
+/// penumbra.)
 #[test]
 fn penumbrae_follow_the_distance_of_what_casts_them() {
     let source = 0.4f64;
     let angle = (2.0 * (0.5 * source).atan()).to_degrees();
-    // From 10% to 90% of a disc's area it is so far along its diameter; the sheet lies 3 m above.
+    // The rise from 10% to 90% of a disc's area spans this share of the disc's diameter. The sheet
+    // lies 3 m above the ground.
     let expected = 0.687 * source * 3.0 / LIGHT.normalize().y.abs();
     for (warp, slices) in &TECHNIQUES[..3] {
         let filter = Filter::Pcss { n: 8, light: LightSize::Degrees(angle as f32) };
         for ramp in ramps(filter, *warp, *slices) {
             let ratio = ramp.metres / expected;
-            assert!((ratio - 1.0).abs() < 0.25, "{warp:?}: {ratio} {ramp:?}");
+            // A warp tilts depth: where the map's gutter widens what may cast, its depths begin
+            // earlier, and the search for blockers is wider than the light asks for.
+            let tolerance = if *warp == Warp::Lispsm { 0.3 } else { 0.15 };
+            assert!((ratio - 1.0).abs() < tolerance, "{warp:?}: {ratio} {ramp:?}");
         }
     }
 }

@@ -48,6 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         required_features: adapter.features() & Support::WANTED_FEATURES,
         ..Default::default()
     }))?;
+    let support = Support::new(&adapter, &device)?;
 
     let corners: [Vec3; 8] = std::array::from_fn(|i| {
         Vec3::new((i & 1) as f32 - 0.5, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32 - 0.5)
@@ -66,8 +67,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         pass.draw_indexed(0..36, 0, instance..instance + 1);
     };
 
-    // 2. Plan the maps, each frame, with a planner that you keep: from your camera's matrices, the light, and boxes around
-    //    what there is.
+    // 2. Plan the maps, each frame, with a planner that you keep: from your camera's matrices, the
+    //    lights, boxes around all models, and a technique.
     let eye = Vec3::new(4.0, 5.0, 30.0);
     let view_from_world = rh::view::look_at_mat4(eye, Vec3::new(-6.0, 1.0, 0.0), Vec3::Y);
     let clip_from_view = rh::proj::directx::perspective(0.9, 16.0 / 9.0, 0.1, 300.0);
@@ -84,13 +85,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let boxes: Vec<Aabb> = models().map(around).collect();
     let bounds = Bounds { receiver_parts: &boxes, ..Bounds::default() };
     let technique: Technique = "adaptive+z2:pcf3".parse()?;
-    let mut planner = Planner::new();
+    let mut planner = Planner::with_limits(support.limits());
     let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &technique)?;
 
-    // 3. The shadows themselves, once: what filters them. And a pipeline that draws casters; for one of your own,
-    //    `Shadows::caster_wgsl`, `depth_stencil_state` and `primitive_state` have what it needs.
+    // 3. The shadows themselves, once, with the technique's filter. And a pipeline that draws casters;
+    //    for one of your own, `Shadows::caster_wgsl`, `caster_fragment`, `depth_stencil_state` and
+    //    `primitive_state` have what it needs.
     let shadow_options = ShadowOptions { filter: technique.filter, ..Default::default() };
-    let mut shadows = Shadows::new(&device, Support::new(&adapter, &device)?, &shadow_options)?;
+    let mut shadows = Shadows::new(&device, support, &shadow_options)?;
     let positions = wgpu::VertexBufferLayout {
         array_stride: 12,
         step_mode: wgpu::VertexStepMode::Vertex,

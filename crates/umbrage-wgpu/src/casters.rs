@@ -12,7 +12,9 @@ use wgpu::{
     VertexStepMode,
 };
 
-/// Draws plain meshes, instanced, into shadow maps: positions times a matrix, and an alpha mask if there is one.
+/// Draws plain meshes, instanced, into shadow maps: positions times a matrix, and an alpha mask if
+/// there is one. On every device it gives the same maps. For other meshes, say skinned ones, write a
+/// vertex stage of your own ([`Shadows::caster_wgsl`]).
 #[derive(Debug)]
 pub struct MeshCasters {
     pipeline: RenderPipeline,
@@ -85,10 +87,9 @@ impl MeshCasters {
         buffers: &[Option<VertexBufferLayout<'_>>],
     ) -> Self {
         let is_masked = kind == MeshKind::Masked;
-        let support = shadows.support();
         let module = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("shadow casters"),
-            source: ShaderSource::Wgsl(wgsl::mesh(support, is_masked).into()),
+            source: ShaderSource::Wgsl(wgsl::mesh(shadows.support(), is_masked).into()),
         });
         let mask_layout = is_masked.then(|| mask_layout(device));
         let layouts = [Some(shadows.caster_layout()), mask_layout.as_ref()];
@@ -97,8 +98,12 @@ impl MeshCasters {
             bind_group_layouts: &layouts[..1 + usize::from(is_masked)],
             immediate_size: 0,
         });
-        // What has neither holes nor depths of its own needs no fragment shader.
-        let has_fragment = is_masked || !support.depth_clip_control;
+        let fragment = match (kind, shadows.caster_needs_fragment()) {
+            (MeshKind::Opaque, false) => None,
+            (MeshKind::Opaque, true) => Some("shadow_caster_fragment"),
+            (MeshKind::Masked, false) => Some("shadow_mesh_clamped_fragment"),
+            (MeshKind::Masked, true) => Some("shadow_mesh_fragment"),
+        };
         let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
             label: Some("shadow casters"),
             layout: Some(&layout),
@@ -111,9 +116,9 @@ impl MeshCasters {
             primitive: shadows.primitive_state(),
             depth_stencil: Some(shadows.depth_stencil_state()),
             multisample: wgpu::MultisampleState::default(),
-            fragment: has_fragment.then(|| FragmentState {
+            fragment: fragment.map(|entry_point| FragmentState {
                 module: &module,
-                entry_point: Some("shadow_mesh_fragment"),
+                entry_point: Some(entry_point),
                 compilation_options: PipelineCompilationOptions::default(),
                 targets: &[],
             }),

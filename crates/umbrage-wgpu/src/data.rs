@@ -1,4 +1,4 @@
-//! What shaders read, as they read it: `wgsl/lookup.wgsl` and `wgsl/caster.wgsl` have the same structs.
+//! What shaders read, as they read it: modules in `wgsl/` have the same structs.
 
 use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
 use crate::{Bias, Error, Support};

@@ -191,7 +191,7 @@ impl Clear {
     pub(crate) fn new(device: &Device) -> Self {
         let module = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("shadow clear"),
-            source: ShaderSource::Wgsl(include_str!("wgsl/clear.wgsl").into()),
+            source: ShaderSource::Wgsl(include_str!("wgsl/clear.wesl").into()),
         });
         let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("shadow clear"),

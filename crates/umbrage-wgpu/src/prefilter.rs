@@ -393,7 +393,9 @@ fn uniforms(device: &Device, size: u32) -> Buffer {
 fn layout(device: &Device, pass: PrefilterPass) -> BindGroupLayout {
     let (sample_type, view_dimension) = match pass {
         PrefilterPass::Encode => (TextureSampleType::Depth, TextureViewDimension::D2),
-        _ => (TextureSampleType::Float { filterable: false }, TextureViewDimension::D2Array),
+        PrefilterPass::Rows | PrefilterPass::Columns | PrefilterPass::Halve => {
+            (TextureSampleType::Float { filterable: false }, TextureViewDimension::D2Array)
+        }
     };
     let entry = |binding, ty| BindGroupLayoutEntry {
         binding,

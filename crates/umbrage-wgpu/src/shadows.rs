@@ -7,15 +7,16 @@ use crate::{Error, Support, data};
 use glam::{DMat4, DVec3};
 use std::mem::size_of;
 use std::num::NonZeroU64;
-use umbrage::visibility::Filter;
+use umbrage::visibility::{Filter, Prefilter};
 use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d,
-    FilterMode, PrimitiveState, Queue, SamplerBindingType, SamplerDescriptor, ShaderStages,
-    Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
-    TextureView, TextureViewDescriptor, TextureViewDimension,
+    FilterMode, FragmentState, PipelineCompilationOptions, PrimitiveState, Queue,
+    SamplerBindingType, SamplerDescriptor, ShaderModule, ShaderStages, Texture, TextureDescriptor,
+    TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView,
+    TextureViewDescriptor, TextureViewDimension,
 };
 
 /// Format of the depth texture.
@@ -189,7 +190,10 @@ impl Shadows {
             .filter
             .check()
             .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
-        let is_spread = matches!(options.filter, Filter::Spread { .. } | Filter::Pcss { .. });
+        let is_spread = match options.filter {
+            Filter::Spread { .. } | Filter::Pcss { .. } => true,
+            Filter::Hard | Filter::Pcf { .. } | Filter::Prefiltered(_) => false,
+        };
         if is_spread && !support.depth_fetch {
             return Err(Error::Unsupported {
                 what: "fetching of depths",
@@ -203,11 +207,12 @@ impl Shadows {
             comparison => comparison,
         };
         let options = ShadowOptions { comparison, ..*options };
-        let filter_mode = match (comparison, options.filter) {
-            (Comparison::Hardware, Filter::Pcf { .. }) | (_, Filter::Prefiltered(_)) => {
-                FilterMode::Linear
+        let filter_mode = match options.filter {
+            Filter::Prefiltered(_) => FilterMode::Linear,
+            Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
+            Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => {
+                FilterMode::Nearest
             }
-            _ => FilterMode::Nearest,
         };
         let sampler = device.create_sampler(&SamplerDescriptor {
             label: Some("shadow sampler"),
@@ -220,9 +225,9 @@ impl Shadows {
         let lookup_layout = lookup_layout(device, &support, &options);
         let buffers = Buffers::new(device, &support);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
-        let prefiltering = match &options.filter {
-            Filter::Prefiltered(p) => Some(Prefiltering::new(device, &support, p, &texture)?),
-            _ => None,
+        let prefiltering = match prefilter(&options.filter) {
+            Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
+            None => None,
         };
         let view = looked_up(&texture, prefiltering.as_ref());
         let lookup_bind_group = buffers.bind(device, &lookup_layout, view, &sampler);
@@ -275,17 +280,42 @@ impl Shadows {
         Ok(())
     }
 
-    /// WGSL to put before the text of a shader that looks shadows up; `group` is the bind group that it takes. All names
-    /// in it begin with `shadow`. Call
+    /// WGSL to put before the text of a shader that looks shadows up; `group` is the bind group that
+    /// it takes. All names in it begin with `shadow`, `Shadow` or `SHADOW`. Call
     ///
     /// ```wgsl
     /// fn shadow_visibility(light: u32, position: vec3f, normal: vec3f) -> f32
     /// ```
     ///
-    /// with a light's index in the plan, a position in render space and the triangle's normal, which need not have unit
-    /// length; in fragment shaders `shadow_normal(position)` makes one. It gives the share of the light, 0 to 1,
-    /// that reaches the point by the maps alone; 1 where no map serves it. That a surface facing away from the light is
-    /// dark is for your shading to say. Textures of other filters may take more bindings in the same group.
+    /// with a light's index in the plan, a position in render space and the triangle's normal, which
+    /// need not have unit length; in fragment shaders `shadow_normal(position)` makes one. It gives
+    /// the share of the light, 0 to 1, that reaches the point by the maps alone; 1 where no map
+    /// serves it. That a surface facing away from the light is dark is for your shading to say.
+    /// Textures of other filters may take more bindings in the same group.
+    ///
+    /// # WESL
+    /// The text is a module of [WESL](https://wesl-lang.dev) too. Give it a path of its own and
+    /// import from it:
+    ///
+    /// ```
+    /// # fn main_wgsl(shadows: &umbrage_wgpu::Shadows) -> Result<String, Box<dyn std::error::Error>> {
+    /// let main = "
+    ///     import package::shadows::{shadow_normal, shadow_visibility};
+    ///
+    ///     @fragment
+    ///     fn main(@location(0) position: vec3f) -> @location(0) vec4f {
+    ///         return vec4f(shadow_visibility(0u, position, shadow_normal(position)));
+    ///     }";
+    /// let mut modules = wesl::VirtualResolver::new();
+    /// modules.add_module("package::shadows".parse()?, shadows.lookup_wgsl(1).into());
+    /// modules.add_module("package::main".parse()?, main.into());
+    /// let compiler = wesl::Wesl::new("").set_custom_resolver(modules);
+    /// let wgsl = compiler.compile(&"package::main".parse()?)?.to_string();
+    /// # Ok(wgsl) }
+    /// ```
+    ///
+    /// It cannot come as a package that is known at build time: its bindings depend on the device
+    /// ([`Support`]), and its constants on the filter.
     pub fn lookup_wgsl(&self, group: u32) -> String {
         wgsl::lookup(group, &self.options, self.support.storage_buffers)
     }
@@ -301,15 +331,68 @@ impl Shadows {
         &self.lookup_bind_group
     }
 
-    /// WGSL to put before the text of a vertex shader that draws casters; `group` is the bind group that holds the map's
-    /// matrix, of which [`Prepared::encode`] sets group 0. Its `shadow_caster_clip(render_position: vec3f) -> vec4f` is the
-    /// position to give out.
+    /// WGSL to put before the text of a shader that draws casters; `group` is the bind group that
+    /// holds the map's matrix, of which [`Prepared::encode`] sets group 0. It declares the same on
+    /// every device, so a shader that is written once is right on all of them:
     ///
-    /// On devices that do not clamp depths (see [`Support`]) there are two more functions: hand
-    /// `shadow_caster_depth(render_position) -> vec2f` on to the fragment shader, and write `shadow_fragment_depth` of it as
-    /// `@builtin(frag_depth)`.
+    /// ```wgsl
+    /// struct ShadowCaster {
+    ///     @builtin(position) clip: vec4f,
+    ///     @location(0) depth: vec2f,
+    /// }
+    /// fn shadow_caster(render_position: vec3f) -> ShadowCaster
+    /// fn shadow_fragment_depth(depth: vec2f) -> f32
+    /// @fragment fn shadow_caster_fragment(caster: ShadowCaster) -> @builtin(frag_depth) f32
+    /// ```
+    ///
+    /// Name your own entry points in pipelines, since the text has some too.
+    ///
+    /// Casters without holes need a vertex stage alone, which returns `shadow_caster` of a position
+    /// in render space. Give their pipeline the fragment stage that
+    /// [`caster_fragment`](Self::caster_fragment) says:
+    ///
+    /// ```wgsl
+    /// @vertex fn vertex(@location(0) position: vec3f) -> ShadowCaster {
+    ///     return shadow_caster(position);
+    /// }
+    /// ```
+    ///
+    /// Casters with a fragment stage of their own, say to discard holes, hand both `clip` and
+    /// `depth` on in a struct of their own, and write `shadow_fragment_depth` of `depth` as
+    /// `@builtin(frag_depth)`. That is right on every device. Where
+    /// [`caster_needs_fragment`](Self::caster_needs_fragment) is `false` another entry point that
+    /// does not write depth is as right, and faster: devices test depth early then.
     pub fn caster_wgsl(&self, group: u32) -> String {
         wgsl::caster(group, &self.support)
+    }
+
+    /// Whether pipelines that draw casters need a fragment stage that writes depth: `true` on
+    /// devices that do not clamp depths (see [`Support::depth_clip_control`]).
+    pub fn caster_needs_fragment(&self) -> bool {
+        !self.support.depth_clip_control
+    }
+
+    /// The fragment stage of a pipeline that draws casters without holes, from a module that begins
+    /// with [`caster_wgsl`](Self::caster_wgsl): the text's own `shadow_caster_fragment`, or `None`
+    /// where the device needs no such stage.
+    ///
+    /// A vertex stage that gives out the clip position without the depth, and so would be wrong on
+    /// some devices, fails wgpu's validation. In builds with debug assertions it does so on every
+    /// device: those that need no fragment stage get one that does nothing.
+    pub fn caster_fragment<'a>(&self, module: &'a ShaderModule) -> Option<FragmentState<'a>> {
+        let entry_point = if self.caster_needs_fragment() {
+            "shadow_caster_fragment"
+        } else if cfg!(debug_assertions) {
+            "shadow_caster_unused_fragment"
+        } else {
+            return None;
+        };
+        Some(FragmentState {
+            module,
+            entry_point: Some(entry_point),
+            compilation_options: PipelineCompilationOptions::default(),
+            targets: &[],
+        })
     }
 
     /// Layout of the bind group that [`caster_wgsl`](Self::caster_wgsl) takes: one uniform with a dynamic offset.
@@ -317,12 +400,15 @@ impl Shadows {
         &self.casters.layout
     }
 
-    /// Depth state for pipelines that draw casters. There is no depth bias in it: the lookup has all of it.
+    /// Depth state for pipelines that draw casters. There is no depth bias in it: the lookup has all
+    /// of it.
     pub fn depth_stencil_state(&self) -> DepthStencilState {
         depth_state(CompareFunction::Less)
     }
 
-    /// Primitive state for pipelines that draw casters: triangles, both sides, depth clamped if the device does so.
+    /// Primitive state for pipelines that draw casters: triangles, both sides, depth clamped if the
+    /// device does so. What it leaves to the fragment stage elsewhere,
+    /// [`caster_wgsl`](Self::caster_wgsl) tells.
     pub fn primitive_state(&self) -> PrimitiveState {
         PrimitiveState {
             unclipped_depth: self.support.depth_clip_control,
@@ -617,9 +703,17 @@ impl CasterBuffer {
     }
 }
 
+/// The filter that is applied ahead of lookup, if it is one.
+fn prefilter(filter: &Filter) -> Option<&Prefilter> {
+    match filter {
+        Filter::Prefiltered(prefilter) => Some(prefilter),
+        Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => None,
+    }
+}
+
 /// Whether the texture unit compares depths.
 fn compares(options: &ShadowOptions) -> bool {
-    options.comparison == Comparison::Hardware && !matches!(options.filter, Filter::Prefiltered(_))
+    options.comparison == Comparison::Hardware && prefilter(&options.filter).is_none()
 }
 
 /// What lookup samples.
@@ -665,22 +759,22 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         buffer(array),
         buffer(array),
         buffer(array),
-        match options.filter {
-            Filter::Prefiltered(_) => BindingType::Texture {
+        match prefilter(&options.filter) {
+            Some(_) => BindingType::Texture {
                 sample_type: TextureSampleType::Float { filterable: true },
                 view_dimension: TextureViewDimension::D2Array,
                 multisampled: false,
             },
-            _ => BindingType::Texture {
+            None => BindingType::Texture {
                 sample_type: TextureSampleType::Depth,
                 view_dimension: view_dimension(options.layout),
                 multisampled: false,
             },
         },
-        BindingType::Sampler(match options.filter {
-            Filter::Prefiltered(_) => SamplerBindingType::Filtering,
-            _ if compares(options) => SamplerBindingType::Comparison,
-            _ => SamplerBindingType::NonFiltering,
+        BindingType::Sampler(match prefilter(&options.filter) {
+            Some(_) => SamplerBindingType::Filtering,
+            None if compares(options) => SamplerBindingType::Comparison,
+            None => SamplerBindingType::NonFiltering,
         }),
     ];
     let entries = (0..).zip(types);

@@ -122,6 +122,11 @@ impl Support {
         })
     }
 
+    /// What a [`Planner`](umbrage::Planner) must know of the device.
+    pub fn limits(&self) -> umbrage::Limits {
+        umbrage::Limits { max_side: self.max_side, ..umbrage::Limits::default() }
+    }
+
     /// A device that can do all, for tests.
     #[cfg(test)]
     pub(crate) const FULL: Self = Self {

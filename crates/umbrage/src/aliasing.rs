@@ -1,18 +1,18 @@
 //! The exact aliasing error of a map at any point, from the Jacobian of the map's own matrix.
 //!
-//! A texel is a beam of light. Where it meets the plane through a point perpendicular to the light it
-//! covers a parallelogram, its [`Footprint`]. Compared with the width of the image beam through a
-//! pixel there, w_i = 2 z tan φ/res_i, this is the *perspective* error: pixels per texel without
-//! regard to what surface is hit (Lloyd et al. 2006, Eq. 1, first factor). On a surface,
-//! [`ShadowMap::surface_error`] also has the second factor, *projection* error, exactly.
+//! A texel stands for a beam of light. This beam meets the plane through a point perpendicular to
+//! the light in a parallelogram, the texel's [`Footprint`]. The footprint's size over the width of
+//! a pixel's image beam at that point, w_i = 2 z tan φ/res_i, is the *perspective* error: pixels
+//! per texel without regard to the surface's orientation (Lloyd et al. 2006, Eq. 1, first factor).
+//! [`ShadowMap::surface_error`] also includes the exact second factor, the *projection* error.
 
 use crate::camera::Camera;
 use crate::math::largest_stretch;
 use crate::plan::ShadowMap;
 use glam::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
 
-/// What one texel covers on the plane perpendicular to the light through a point: the parallelogram
-/// spanned by two vectors, world space, metres.
+/// The parallelogram that one texel covers on the plane through a point perpendicular to the light,
+/// spanned by two vectors in world space, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// Step from one texel to the next in s.
@@ -22,17 +22,18 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Length of the parallelogram's base: the texel's width across the warp, metres.
+    /// Length of the parallelogram's base: the texel's width across the warp's axis, metres.
     pub fn base(&self) -> f64 {
         self.per_s.length()
     }
 
-    /// Height of the parallelogram over its base: the texel's width along the warp, metres.
+    /// Height of the parallelogram over its base: the texel's width along the warp's axis, metres.
     pub fn height(&self) -> f64 {
         self.per_s.cross(self.per_t).length() / self.per_s.length()
     }
 
-    /// Largest singular value: how far the texel reaches per unit step in the worst direction, metres.
+    /// Larger singular value of the map from texel coordinates to the plane: the texel's width in
+    /// the worst direction, metres.
     pub fn longest(&self) -> f64 {
         largest_stretch(
             self.per_s.length_squared(),
@@ -42,47 +43,47 @@ impl Footprint {
     }
 }
 
-/// Perspective error at a point, pixels per texel: above 1 shadows show jags, below 1 texels are
-/// wasted.
+/// Perspective error at a point, pixels per texel. Above 1, shadow edges show jagged texels; below
+/// 1, texels are wasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointError {
     /// m_s: base of the texel's footprint over a pixel's width.
     pub s: f64,
-    /// m_t: height of the footprint over a pixel's width.
+    /// m_t: height of the texel's footprint over a pixel's width.
     pub t: f64,
-    /// Error in the worst direction.
+    /// Error in the worst direction: the footprint's longest width over a pixel's width.
     pub worst: f64,
 }
 
-/// Error on a surface, pixels per texel, perspective and projection together.
+/// Error on a surface, the product of perspective and projection error, pixels per texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceError {
-    /// In the worst direction: the larger singular value of the map from texels to pixels.
+    /// Error in the worst direction: the larger singular value of the map from texels to pixels.
     /// Infinite where the surface is edge-on to the light.
     pub worst: f64,
-    /// In the best direction: the smaller singular value.
+    /// Error in the best direction: the smaller singular value.
     pub best: f64,
 }
 
-/// The pieces of a map's projection at a point.
+/// A map's projection of one point, with its derivatives.
 pub(crate) struct Local {
-    /// (s, t, depth).
+    /// Shadow coordinates (s, t, depth).
     pub shadow: DVec3,
     /// Fourth coordinate of the projection.
     pub w: f64,
     /// Unit vector along the beam, away from the light.
     pub beam: DVec3,
-    /// Gradients of texel coordinates, 1/m.
+    /// Gradients of the texel coordinates in s and t, texels per metre.
     pub grad_s: DVec3,
     pub grad_t: DVec3,
-    /// d row / d t of the map's rows here.
+    /// Derivative of the map's row coordinate with respect to t.
     pub row_derivative: f64,
     /// Growth of depth along the beam, 1/m.
     pub depth_per_metre: f64,
 }
 
 impl Local {
-    /// `p` in local space. `None` where the map does not apply.
+    /// The projection of `p`, in local space; `None` where the map does not apply.
     pub(crate) fn at(map: &ShadowMap, p: DVec3) -> Option<Self> {
         let m = map.shadow_from_local;
         let [s, t, depth, w] = [0, 1, 2, 3].map(|i| m.row(i));
@@ -116,17 +117,18 @@ impl Local {
 }
 
 impl ShadowMap {
-    /// Unit vector along the beam through a local point, away from the light; `None` at a spot
-    /// light's own position.
+    /// Unit vector along the beam through a local point, away from the light; `None` at the
+    /// position of a spot light.
     pub(crate) fn beam_direction(&self, local: DVec3) -> Option<DVec3> {
         match self.apex {
             Some(apex) => (local - apex).try_normalize(),
-            // All beams meet where depth is infinite, which is the image of the z axis.
+            // Parallel beams meet at infinite depth, which is the image of shadow space's depth
+            // axis.
             None => self.local_from_shadow.z_axis.truncate().try_normalize(),
         }
     }
 
-    /// What one texel covers around a world point; `None` where the map does not apply.
+    /// Footprint of a texel at a world point; `None` where the map does not apply.
     pub fn footprint(&self, world_position: DVec3) -> Option<Footprint> {
         (!self.is_empty())
             .then(|| Local::at(self, world_position - self.origin))?
@@ -146,8 +148,9 @@ impl ShadowMap {
         })
     }
 
-    /// Error on a surface with the given normal (any length, either side) at a world point seen by
-    /// `camera`; `None` where the map does not apply or the point lies behind the eye.
+    /// Error on a surface with the given normal (of any length, to either side) at a world point
+    /// seen by `camera`. `None` where the map does not apply, the point lies behind the eye, or the
+    /// normal has no direction.
     pub fn surface_error(
         &self,
         camera: &Camera,
@@ -167,7 +170,8 @@ impl ShadowMap {
         if det == 0.0 {
             return Some(SurfaceError { worst: f64::INFINITY, best: 0.0 });
         }
-        // adj(texels)/det instead of an inverse keeps edge-on surfaces at infinity, not NaN.
+        // The adjugate divided by the determinant gives infinity for edge-on surfaces where an
+        // inverse would give NaN.
         let adjugate = DMat2::from_cols(
             DVec2::new(texels.y_axis.y, -texels.x_axis.y),
             DVec2::new(-texels.y_axis.x, texels.x_axis.x),

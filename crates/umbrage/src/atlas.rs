@@ -2,94 +2,100 @@ use crate::plan::Plan;
 use glam::DVec2;
 use guillotiere::{AllocatorOptions, DEFAULT_OPTIONS, SimpleAtlasAllocator, size2};
 
-/// Where in a texture, or in an array of them, the maps of a [`Plan`] lie.
+/// Where the maps of a [`Plan`] lie in a texture or in an array of textures.
 ///
-/// Around each map lies a gutter, no texel of which is shared. Render it with the map (texels just
-/// outside [0, 1]² have depths like any other), so that filters at a map's border see no other map.
+/// Each map is surrounded by a gutter, which shares no texel with other maps or gutters. Render the
+/// gutter together with the map (texels just outside [0, 1]² have depths like any others), so that
+/// a filter at a map's border reads no texels of other maps.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Atlas {
-    /// Width and height of the texture, texels; both 0 where all maps are empty.
+    /// Width and height of the texture in texels; both 0 if all maps are empty.
     pub size: [u32; 2],
-    /// Layers of the texture, all of one size.
+    /// Number of the texture's layers, which all have this size.
     pub layers: u32,
     /// Width of the gutter around each map, texels.
     pub gutter_texels: u32,
-    /// Where each map lies, in the order of [`Plan::maps`]; `None` for those that are empty.
+    /// The place of each map, in the order of [`Plan::maps`]; `None` for empty maps.
     pub places: Vec<Option<Place>>,
 }
 
 /// A rectangle of texels in an [`Atlas`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Layer of the texture.
+    /// Index of the texture's layer.
     pub layer: u32,
-    /// Texel of that layer at which the map begins, inside its gutter: (s, t) = (0, 0).
+    /// First texel of the map in that layer, not counting its gutter: (s, t) = (0, 0) lies at its
+    /// corner.
     pub origin: [u32; 2],
-    /// The map's resolution, texels.
+    /// Resolution of the map, texels in s and t.
     pub size: [u32; 2],
 }
 
-/// Takes a map's (s, t), after [`Rows`](crate::Rows), to where it lies: scale · (s, t) + offset.
+/// Takes a map's (s, t), after [`Rows`](crate::Rows), to a position in the texture: scale · (s, t)
+/// + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaleOffset {
-    /// Factors of s and t.
+    /// Factors of s and of t.
     pub scale: DVec2,
-    /// Where (0, 0) lies.
+    /// Position of (s, t) = (0, 0).
     pub offset: DVec2,
 }
 
-/// The maps do not fit into one texture.
+/// The error of maps for which one texture has no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "no room for {maps} shadow maps of {texels} texels, gutters included, in a texture of {max_side}x{max_side}"
 )]
 pub struct AtlasTooLarge {
-    /// Maps that are not empty.
+    /// Number of maps that are not empty.
     pub maps: usize,
-    /// Their texels, gutters included.
+    /// Number of their texels, including gutters.
     pub texels: u64,
     /// The longest side that was allowed, texels.
     pub max_side: u32,
 }
 
 impl Atlas {
-    /// All maps side by side in one texture, as small and as square as the search finds. The same plan
-    /// gives the same atlas, but a plan that differs little may give one that differs much.
+    /// Packs all maps side by side into one texture, which the search makes as small and as square
+    /// as it can. Equal plans give equal atlases, but nearly equal plans may give very different
+    /// ones.
     ///
-    /// Gutters are as wide as the plan's filter [reaches](crate::visibility::Filter::reach_texels) beyond
-    /// a map, and maps begin where it [asks](crate::visibility::Filter::slot_texels) for it. `max_side`
-    /// is the longest side that the device allows a texture, texels. Allocates.
+    /// Gutters are as wide as the plan's filter [reaches](crate::visibility::Filter::reach_texels)
+    /// beyond a map. Maps begin at multiples of texels that the filter
+    /// [requires](crate::visibility::Filter::slot_texels). `max_side` is the longest side of a
+    /// texture that the device allows, texels. Allocates memory.
     ///
     /// # Errors
-    /// Where no arrangement is found. Over plans of the built-in scenes with 4 to 102 maps, maps and
-    /// gutters filled 93% of the atlas in the mean, 85% at worst.
+    /// If the search finds no arrangement. For plans of the built-in scenes with 4 to 102 maps,
+    /// maps and gutters filled 93% of the atlas on average, and 85% in the worst case.
     pub fn packed(plan: &Plan, max_side: u32) -> Result<Self, AtlasTooLarge> {
         Self::packed_sizes(&slots(plan), plan.filter.reach_texels(), max_side)
             .map(|atlas| atlas.holding(plan))
     }
 
-    /// As [`packed`](Self::packed), for rectangles of any sizes (texels in s and t): those of a plan's maps with
-    /// room to grow, say. One without texels has no place.
+    /// Like [`packed`](Self::packed), for rectangles of any sizes (texels in s and t), for example
+    /// maps with room to grow. A rectangle without texels gets no place.
     ///
     /// # Errors
-    /// Where no arrangement is found.
+    /// If the search finds no arrangement.
     pub fn packed_sizes(
         sizes: &[[u32; 2]],
         gutter_texels: u32,
         max_side: u32,
     ) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
-        let packing = boxes.pack().ok_or(boxes.too_large)?;
+        let rectangles = Rectangles::new(sizes, gutter_texels, max_side)?;
+        let packing = rectangles.pack().ok_or(rectangles.too_large)?;
         let mut places = vec![None; sizes.len()];
-        for (&(map, _), corner) in boxes.list.iter().zip(packing.corners) {
+        for (&(map, _), corner) in rectangles.list.iter().zip(packing.corners) {
             let origin = corner.map(|c| c + gutter_texels);
             places[map] = Some(Place { layer: 0, origin, size: sizes[map] });
         }
         Ok(Self { size: packing.size, layers: 1, gutter_texels, places })
     }
 
-    /// Each map in a layer of its own, in the order of [`Plan::maps`], all as wide and as high as the
-    /// largest. Empty maps keep their layers, so that no map moves when others become empty.
+    /// Puts each map into a layer of its own, in the order of [`Plan::maps`]. All layers are as
+    /// wide and as high as the largest map needs. Empty maps keep their layers, so that no map
+    /// moves when others become empty.
     ///
     /// Parameters and errors are those of [`packed`](Self::packed).
     pub fn layered(plan: &Plan, max_side: u32) -> Result<Self, AtlasTooLarge> {
@@ -97,7 +103,7 @@ impl Atlas {
             .map(|atlas| atlas.holding(plan))
     }
 
-    /// With places as large as a plan's maps, which may be smaller than their slots.
+    /// Shrinks each place to the resolution of its map, which may be smaller than its slot.
     fn holding(mut self, plan: &Plan) -> Self {
         for (place, map) in self.places.iter_mut().zip(&plan.maps) {
             *place = place.map(|place| Place { size: map.resolution, ..place });
@@ -105,38 +111,38 @@ impl Atlas {
         self
     }
 
-    /// As [`layered`](Self::layered), for rectangles of any sizes (texels in s and t).
+    /// Like [`layered`](Self::layered), for rectangles of any sizes (texels in s and t).
     ///
     /// # Errors
-    /// One that does not fit.
+    /// If one rectangle with its gutters is larger than a texture may be.
     pub fn layered_sizes(
         sizes: &[[u32; 2]],
         gutter_texels: u32,
         max_side: u32,
     ) -> Result<Self, AtlasTooLarge> {
-        let boxes = Boxes::new(sizes, gutter_texels, max_side)?;
+        let rectangles = Rectangles::new(sizes, gutter_texels, max_side)?;
         let places = sizes.iter().zip(0..).map(|(&size, layer)| {
             let is_there = !size.contains(&0);
             is_there.then_some(Place { layer, origin: [gutter_texels; 2], size })
         });
         Ok(Self {
-            size: boxes.largest(),
+            size: rectangles.largest(),
             layers: sizes.len() as u32,
             gutter_texels,
             places: places.collect(),
         })
     }
 
-    /// From a map's (s, t) to texels of its layer. `None` for empty maps and those that the plan does
-    /// not have.
+    /// The transform from a map's (s, t) to texels of its layer. `None` for maps that are empty or
+    /// do not exist.
     pub fn texels_from_shadow(&self, map: usize) -> Option<ScaleOffset> {
         let Place { origin, size, .. } = (*self.places.get(map)?)?;
         let [scale, offset] = [size, origin].map(|[x, y]: [u32; 2]| DVec2::new(x.into(), y.into()));
         Some(ScaleOffset { scale, offset })
     }
 
-    /// From a map's (s, t) to texture coordinates in [0, 1]² of its layer; otherwise as
-    /// [`texels_from_shadow`](Self::texels_from_shadow).
+    /// The transform from a map's (s, t) to texture coordinates in [0, 1]² of its layer. `None` as
+    /// for [`texels_from_shadow`](Self::texels_from_shadow).
     pub fn atlas_from_shadow(&self, map: usize) -> Option<ScaleOffset> {
         let ScaleOffset { scale, offset } = self.texels_from_shadow(map)?;
         let size = DVec2::new(self.size[0].into(), self.size[1].into());
@@ -145,44 +151,44 @@ impl Atlas {
 }
 
 impl ScaleOffset {
-    /// Where `st` lies.
+    /// The position of `st`.
     pub fn apply(self, st: DVec2) -> DVec2 {
         self.scale * st + self.offset
     }
 }
 
-/// What each of a plan's maps takes between its gutters, texels.
+/// The size of each map's slot without gutters, texels.
 fn slots(plan: &Plan) -> Vec<[u32; 2]> {
     plan.maps.iter().map(|m| plan.filter.slot_texels(m.resolution)).collect()
 }
 
 /// Rectangles to be packed.
-struct Boxes {
-    /// Index of the map, and its size with gutters.
+struct Rectangles {
+    /// Index of each map that is not empty, and its size including gutters.
     list: Vec<(usize, [u32; 2])>,
     max_side: u32,
-    /// What to say where there is no room.
+    /// The error to return where there is no room.
     too_large: AtlasTooLarge,
 }
 
-/// Rectangles side by side.
+/// An arrangement of rectangles side by side.
 struct Packing {
     size: [u32; 2],
-    /// Of each rectangle, the one with the smallest coordinates.
+    /// Each rectangle's corner with the smallest coordinates.
     corners: Vec<[u32; 2]>,
 }
 
 impl Packing {
-    /// What to make small: the area, times a little more for every step away from a square. Long
-    /// strips reach a device's limits first.
+    /// The quantity to minimise: the area, increased by a small penalty for shapes far from a
+    /// square, because long strips reach a device's limits first.
     fn cost(&self) -> f64 {
         let [w, h] = self.size.map(f64::from);
         w * h * (1.0 + STRIP_COST * (w.max(h) / w.min(h) - 1.0))
     }
 }
 
-impl Boxes {
-    /// The maps with their gutters, if each of them fits.
+impl Rectangles {
+    /// The maps with their gutters, or an error if one of them alone is too large.
     fn new(sizes: &[[u32; 2]], gutter_texels: u32, max_side: u32) -> Result<Self, AtlasTooLarge> {
         let with_gutters = |size: [u32; 2]| {
             size.map(|n| u64::from(n).saturating_add(2 * u64::from(gutter_texels)))
@@ -203,22 +209,23 @@ impl Boxes {
         Ok(Self { list, max_side, too_large })
     }
 
-    /// The size that holds any one of them.
+    /// The smallest size that can hold any one of the rectangles.
     fn largest(&self) -> [u32; 2] {
         self.list.iter().fold([0, 0], |[w, h], &(_, size)| [w.max(size[0]), h.max(size[1])])
     }
 
-    /// The best packing over several orders and widths, and for each of these the lowest height.
+    /// The best packing found over several orders and widths, with the lowest height found for each
+    /// of these.
     fn pack(&self) -> Option<Packing> {
         let texels = self.too_large.texels;
         let [widest, highest] = self.largest();
         if texels == 0 {
             return Some(Packing { size: [0, 0], corners: Vec::new() });
         }
-        // From half as wide as the side of a square that had no gaps to twice as wide; more of these for
-        // few maps, whose shapes matter most.
+        // Widths range from half to twice the side of a square without gaps. With few maps more
+        // widths are tried, because the shapes of few maps matter most.
         let side = (texels as f64).sqrt();
-        let steps = (PATIENCE / self.list.len()).clamp(2, 24) as i32;
+        let steps = (SEARCH_EFFORT / self.list.len()).clamp(2, 24) as i32;
         let widths = (-steps..=steps).map(|i| {
             let ratio = (f64::from(i) / f64::from(steps)).exp2();
             ((side * ratio).ceil() as u32).clamp(widest, self.max_side)
@@ -231,8 +238,8 @@ impl Boxes {
             sorted.sort_by_key(|&i| std::cmp::Reverse(order(self.list[i].1)));
             for &width in &widths {
                 let mut low = highest.max(texels.div_ceil(width.into()).try_into().ok()?);
-                // Much higher than this is no better than the best so far. (As not all of the width
-                // need be used, a little higher may be.)
+                // A packing much higher than this costs no less than the best one so far. (The
+                // factor 1.1 is because a packing need not use all of the width.)
                 let bound = best.as_ref().map_or(f64::MAX, |b| 1.1 * b.cost() / f64::from(width));
                 let mut high = self.max_side.min(bound as u32);
                 while low <= high {
@@ -252,7 +259,7 @@ impl Boxes {
         best
     }
 
-    /// Packs into one rectangle, in this order.
+    /// Packs the rectangles into a texture of this size in this order; `None` if there is no room.
     fn pack_into(&self, size: [u32; 2], order: &[usize]) -> Option<Packing> {
         let int = |n: u32| i32::try_from(n).unwrap_or(i32::MAX);
         let mut allocator =
@@ -261,28 +268,30 @@ impl Boxes {
         for &i in order {
             let [w, h] = self.list[i].1;
             let place = allocator.allocate(size2(int(w), int(h)))?;
-            packing.corners[i] = place.min.to_array().map(i32::cast_unsigned);
-            let end = place.max.to_array().map(i32::cast_unsigned);
+            packing.corners[i] = place.min.to_array().map(|texel| texel as u32);
+            let end = place.max.to_array().map(|texel| texel as u32);
             packing.size = [packing.size[0].max(end[0]), packing.size[1].max(end[1])];
         }
         Some(packing)
     }
 }
 
-/// What a strip of 2 : 1 may be larger than a square, as a share.
+/// The share by which the area of a 2 : 1 rectangle must be smaller than that of a square to cost
+/// the same.
 const STRIP_COST: f64 = 0.02;
-/// The search is coarser for more maps than this.
-const PATIENCE: usize = 1024;
-/// Heights closer than one part in this many are not told apart.
+/// Number of widths tried to each side of the square's, times the number of maps; the former is
+/// kept within 2 to 24.
+const SEARCH_EFFORT: usize = 1024;
+/// The search distinguishes heights that differ by at least one part in this number.
 const FINENESS: u32 = 64;
 
-/// What comes first, by decreasing size: none of these is best for all plans.
+/// Sort keys for the order of packing, largest first. None of these orders is best for all plans.
 const ORDERS: [fn([u32; 2]) -> [u32; 2]; 3] =
     [|[w, h]| [h, w], |[w, h]| [w, h], |[w, h]| [w.max(h), w.min(h)]];
 
-/// One list of free rectangles, of which the one that fits closest is taken. With the crate's own
-/// thresholds large rectangles go where most room is left, which keeps a long-lived atlas from
-/// crumbling; filled once, it wastes three times as much.
+/// One list of free rectangles, of which the smallest that suffices is taken. The crate's default
+/// thresholds place large rectangles where most room is left, which keeps a long-lived atlas from
+/// fragmenting, but in an atlas that is filled once they waste three times as much.
 const BEST_FIT: AllocatorOptions = AllocatorOptions {
     small_size_threshold: i32::MAX,
     large_size_threshold: i32::MAX,

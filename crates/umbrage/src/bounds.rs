@@ -6,12 +6,12 @@ use glam::DVec3;
 pub struct Aabb {
     /// Corner with the smallest coordinates.
     pub min: DVec3,
-    /// Corner with the largest coordinates. A flat box (`min == max` along an axis) is fine.
+    /// Corner with the largest coordinates. The box may be flat (`min == max` along an axis).
     pub max: DVec3,
 }
 
 impl Aabb {
-    /// The box that holds nothing; the neutral element of [`union`](Self::union).
+    /// The box that contains no point, which is the neutral element of [`union`](Self::union).
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     /// A box from two opposite corners.
@@ -19,22 +19,22 @@ impl Aabb {
         Self { min: a.min(b), max: a.max(b) }
     }
 
-    /// The smallest box around `points`; [`EMPTY`](Self::EMPTY) without any.
+    /// The smallest box around `points`; [`EMPTY`](Self::EMPTY) if there are none.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| b.union(Self { min: p, max: p }))
     }
 
-    /// The smallest box around both.
+    /// The smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// The box of what lies in both; holds no point if they do not meet.
+    /// The intersection of both boxes; it is [empty](Self::is_empty) if they do not meet.
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
-    /// Whether the box holds no point at all.
+    /// Whether the box contains no point.
     pub fn is_empty(self) -> bool {
         self.min.cmpgt(self.max).any()
     }
@@ -61,7 +61,7 @@ impl Aabb {
         })
     }
 
-    /// The same box as seen from `origin`.
+    /// The same box in coordinates relative to `origin`.
     pub(crate) fn relative_to(self, origin: DVec3) -> Self {
         Self { min: self.min - origin, max: self.max - origin }
     }
@@ -78,23 +78,27 @@ impl Aabb {
     }
 }
 
-/// Where shadows are cast from and received. Tighter bounds give finer shadows.
+/// Where casters and receivers lie. Tighter bounds give finer shadows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds<'a> {
-    /// Everything that receives shadows; `None` if unknown: the whole view frustum is served.
+    /// A box around everything that receives shadows. `None` if unknown; then the whole view
+    /// frustum is served.
     pub receivers: Option<Aabb>,
-    /// Boxes that hold all of the receivers between them, if more is known than one box around all; they may
-    /// overlap. Empty: all of `receivers`. Where one box would be full of air, some dozens of boxes
-    /// spare the maps what nobody sees: one for each object, say. Planning takes time in proportion.
+    /// Boxes that together contain all receivers and may overlap, for closer bounds than one box.
+    /// If empty, all of `receivers` counts. Where one box would contain mostly air, some dozens of
+    /// boxes, one for each object say, save the texels of that air. Planning time grows in
+    /// proportion to the number of boxes.
     pub receiver_parts: &'a [Aabb],
-    /// Everything that casts shadows; `None` if unknown: casters may lie anywhere towards the light.
-    /// Only [`Cover::Scene`](crate::Cover::Scene) and maps that [keep their casters' depths](crate::visibility::Filter::keeps_casters)
-    /// have to cover it. Others need not: what lies between the receivers and the light is clamped to depth 0.
+    /// A box around everything that casts shadows. `None` if unknown; then casters may lie anywhere
+    /// towards the light. Only maps with [`Cover::Scene`](crate::Cover::Scene) and maps that [keep
+    /// their casters' depths](crate::visibility::Filter::keeps_casters) have to include the casters
+    /// in their range of depths. All other maps clamp the depths of casters between the receivers
+    /// and the light to 0.
     pub casters: Option<Aabb>,
 }
 
 impl Bounds<'_> {
-    /// One box that holds both receivers and casters.
+    /// Bounds of one box that contains both receivers and casters.
     pub fn of_scene(scene: Aabb) -> Self {
         Self { receivers: Some(scene), receiver_parts: &[], casters: Some(scene) }
     }
@@ -106,32 +110,34 @@ impl Bounds<'_> {
     }
 }
 
-/// A half-space: the points p with `normal · p + offset ≥ 0`.
+/// A half-space: all points p with `normal · p + offset ≥ 0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Points into the half-space. Unit length.
+    /// Unit vector that points into the half-space.
     pub normal: DVec3,
-    /// Metres.
+    /// Signed distance of the origin from the bounding plane, metres; positive if the origin is
+    /// inside.
     pub offset: f64,
 }
 
 impl Plane {
-    /// The half-space through `point` on the side that `normal` (unit) points to.
+    /// The half-space whose bounding plane passes through `point` and whose inside `normal` (a unit
+    /// vector) points to.
     pub fn through(point: DVec3, normal: DVec3) -> Self {
         Self { normal, offset: -normal.dot(point) }
     }
 
-    /// Signed distance of `p`, metres; positive inside.
+    /// Signed distance of `p` from the bounding plane, metres; positive inside.
     pub fn distance(self, p: DVec3) -> f64 {
         self.normal.dot(p) + self.offset
     }
 
-    /// The half-space on the other side.
+    /// The complementary half-space.
     pub(crate) fn flipped(self) -> Self {
         Self { normal: -self.normal, offset: -self.offset }
     }
 
-    /// Whether any point of `aabb` may lie inside.
+    /// Whether any point of `aabb` may lie inside the half-space.
     pub fn may_touch(self, aabb: Aabb) -> bool {
         let farthest = DVec3::select(self.normal.cmpge(DVec3::ZERO), aabb.max, aabb.min);
         self.distance(farthest) >= 0.0

@@ -1,18 +1,19 @@
 use crate::error::{Error, check, check_position, unit};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
-/// A perspective view: where from, where to, how wide, how far, onto how many pixels.
+/// A perspective view: its position and direction, field of view, depth range and size in pixels.
 ///
-/// Shadows are planned for the points between [`near`](Self::near) and [`far`](Self::far), measured
-/// along the view direction. Create one with [`Camera::look_at`] or from an engine's matrices with
-/// [`Camera::from_matrices`]; both check their input, so a `Camera` is always valid.
+/// Shadows are planned for points whose distance along the view direction lies between
+/// [`near`](Self::near) and [`far`](Self::far). Cameras are made by [`Camera::look_at`] or, from an
+/// engine's matrices, by [`Camera::from_matrices`]; both check their input, so a `Camera` is always
+/// valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     eye: DVec3,
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// Slopes of the side planes: x/z at the left and right, y/z at the bottom and top edge.
+    /// Slopes of the side planes: x/z at the left and right edge, y/z at the bottom and top edge.
     slope_min: DVec2,
     slope_max: DVec2,
     near: f64,
@@ -20,40 +21,44 @@ pub struct Camera {
     image: [u32; 2],
 }
 
-/// Input to [`Camera::look_at`]. All lengths in metres.
+/// Input to [`Camera::look_at`]. All lengths are in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LookAt {
     /// Position of the viewer.
     pub eye: DVec3,
-    /// The point in the middle of the picture.
+    /// The point in the middle of the image.
     pub target: DVec3,
-    /// Direction that is up in the picture. If it is parallel to the view, an axis that is not
-    /// takes its place.
+    /// Direction that points up in the image. If it is parallel to the view direction, some
+    /// perpendicular direction replaces it.
     pub up: DVec3,
     /// Vertical field of view, radians, in (0, π).
     pub fov_y_rad: f64,
-    /// Distance at which the view begins, ≥ 1e-12.
+    /// Distance of the near plane, ≥ 1e-12.
     pub near: f64,
-    /// Distance at which shadows end, > `near`.
+    /// Distance beyond which no shadows are needed, > `near`.
     pub far: f64,
-    /// Pixels, width and height, 1 ..= 65536 each. Their ratio is the aspect ratio.
+    /// Width and height of the image in pixels, 1 ..= 65536 each. Their ratio is the aspect ratio.
     pub image: [u32; 2],
 }
 
-/// Which depth range a clip space has. Reversed depth needs no telling: it shows in the matrix.
+/// The depth range of a clip space. Reversed depth is recognised from the matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClipDepth {
-    /// WebGPU, Direct3D, Metal, Vulkan.
+    /// Depths from 0 to 1: WebGPU, Direct3D, Metal, Vulkan.
     ZeroToOne,
-    /// OpenGL.
+    /// Depths from −1 to 1: OpenGL.
     MinusOneToOne,
 }
+
+/// Fields of the input to [`Camera::from_matrices`], for its errors.
+const POSE: &str = "camera.world_from_view";
+const PROJECTION: &str = "camera.clip_from_view";
 
 impl Camera {
     /// A symmetrical view from `eye` towards `target`.
     ///
     /// # Errors
-    /// Names the field that is not finite, has no length, or is out of its range.
+    /// Names the field that is not finite, is a direction of length 0, or is out of its range.
     pub fn look_at(l: LookAt) -> Result<Self, Error> {
         check_position(l.eye, "camera.eye")?;
         check_position(l.target, "camera.target")?;
@@ -91,16 +96,16 @@ impl Camera {
         .checked()
     }
 
-    /// The view of an engine's own matrices: any handedness, depth 0 to 1, −1 to 1, reversed, or
-    /// infinitely far, off-centre frusta included.
+    /// The view of an engine's own matrices. They may have either handedness, depths from 0 to 1 or
+    /// from −1 to 1, also reversed, an infinite far plane, and an off-centre frustum.
     ///
     /// `world_from_view` is the camera's rigid pose, `clip_from_view` its perspective projection.
-    /// `shadow_distance` (metres, along the view) replaces the far plane where it is nearer; an
-    /// infinite projection needs it.
+    /// `shadow_distance` (metres along the view) replaces the far plane's distance if it is
+    /// smaller; it is required if the far plane is infinite. `image` is the size in pixels.
     ///
     /// # Errors
-    /// A pose that scales, shears or mirrors, a projection that is not a perspective one or turns
-    /// x or y upside down, a missing shadow distance.
+    /// If the pose scales, shears or mirrors, if the projection is not a perspective one or flips x
+    /// or y, or if the required shadow distance is missing.
     pub fn from_matrices(
         world_from_view: DMat4,
         clip_from_view: DMat4,
@@ -108,8 +113,6 @@ impl Camera {
         shadow_distance: Option<f64>,
         image: [u32; 2],
     ) -> Result<Self, Error> {
-        const POSE: &str = "camera.world_from_view";
-        const PROJECTION: &str = "camera.clip_from_view";
         check_image(image)?;
         check(world_from_view.is_finite(), POSE, || "has entries that are not finite".into())?;
         check(clip_from_view.is_finite(), PROJECTION, || "has entries that are not finite".into())?;
@@ -125,7 +128,7 @@ impl Camera {
         check_position(world_from_view.col(3).truncate(), POSE)?;
 
         let [x, y, z, w] = [0, 1, 2, 3].map(|i| clip_from_view.row(i));
-        // The sign of w's z entry is the handedness: −1 looks along −z, +1 along +z.
+        // The sign of w's z entry gives the handedness: −1 looks along −z, +1 along +z.
         let sign = w.z.signum();
         let scale = w.z.abs();
         let is_perspective = scale > 0.0
@@ -140,47 +143,12 @@ impl Camera {
         check(x.x > 0.0 && y.y > 0.0, PROJECTION, || {
             "must keep x to the right and y up: flip the picture elsewhere".into()
         })?;
-        // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d): solve for the two ends.
-        let distance_of = |ndc: f64| z.w / (ndc * scale - z.z * sign);
-        let low = match clip_depth {
-            ClipDepth::ZeroToOne => 0.0,
-            ClipDepth::MinusOneToOne => -1.0,
-        };
-        let [a, b] = [distance_of(low), distance_of(1.0)];
-        // An infinite far plane comes out as ±∞, or as a huge distance of either sign by rounding.
-        let huge = 1e9 * a.abs().min(b.abs());
-        check([a, b].iter().all(|&d| d > 0.0 || d < -huge), PROJECTION, || {
-            format!("has its near and far plane at {a} and {b}, not both before the viewer")
-        })?;
-        let finite = |d: f64| d > 0.0 && d < huge.min(1e12);
-        let (near, far) = match (finite(a), finite(b)) {
-            (true, true) => (a.min(b), a.max(b)),
-            (true, false) => (a, f64::INFINITY),
-            (false, true) => (b, f64::INFINITY),
-            (false, false) => {
-                return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
-            }
-        };
-        let far = match shadow_distance {
-            None if far == f64::INFINITY => {
-                return Err(Error::invalid(
-                    "camera.shadow_distance",
-                    "is needed, because the projection has no far plane",
-                ));
-            }
-            None => far,
-            Some(d) => {
-                check(d > near, "camera.shadow_distance", || {
-                    format!("must exceed the near distance {near}, is {d}")
-                })?;
-                far.min(d)
-            }
-        };
+        let [near, far] = depth_range(z, w, clip_depth, shadow_distance)?;
         let slope = |ndc: DVec2| {
             DVec2::new((ndc.x * scale - x.z * sign) / x.x, (ndc.y * scale - y.z * sign) / y.y)
         };
         let forward = (axes[2] * sign).normalize();
-        // In a left-handed view space the x axis still points right in the picture.
+        // In a left-handed view space, too, the x axis points right in the image.
         let up = (axes[1] - forward * axes[1].dot(forward)).normalize();
         let right = forward.cross(up);
         check(right.dot(axes[0]) > 0.0, POSE, || {
@@ -227,32 +195,32 @@ impl Camera {
         self.eye
     }
 
-    /// Unit vector to the right in the picture.
+    /// Unit vector that points right in the image.
     pub fn right(&self) -> DVec3 {
         self.right
     }
 
-    /// Unit vector up in the picture.
+    /// Unit vector that points up in the image.
     pub fn up(&self) -> DVec3 {
         self.up
     }
 
-    /// Unit vector of the view direction.
+    /// Unit vector along the view direction.
     pub fn forward(&self) -> DVec3 {
         self.forward
     }
 
-    /// Distance at which the view begins, metres.
+    /// Distance of the near plane, metres.
     pub fn near(&self) -> f64 {
         self.near
     }
 
-    /// Distance at which shadows end, metres.
+    /// Distance beyond which no shadows are needed, metres.
     pub fn far(&self) -> f64 {
         self.far
     }
 
-    /// Pixels, width and height.
+    /// Width and height of the image in pixels.
     pub fn image(&self) -> [u32; 2] {
         self.image
     }
@@ -260,7 +228,7 @@ impl Camera {
     /// The same view with another depth range, metres.
     ///
     /// # Errors
-    /// Unless 0 < near < far.
+    /// Unless 1e-12 ≤ near < far ≤ 1e12.
     pub fn with_depth_range(self, near: f64, far: f64) -> Result<Self, Error> {
         Self { near, far, ..self }.checked()
     }
@@ -270,19 +238,21 @@ impl Camera {
         self.forward.dot(world_position - self.eye)
     }
 
-    /// Tangent of half the vertical field of view (of the whole one's half, if off-centre).
+    /// Tangent of half the vertical field of view. For off-centre frusta it is half the image's
+    /// height at a distance of one metre, in metres.
     pub fn tan_half_fov_y(&self) -> f64 {
         (self.slope_max.y - self.slope_min.y) / 2.0
     }
 
-    /// Width of an image beam (one pixel) at a distance of one metre, metres: w_i(z) is this times z
-    /// (Lloyd et al. 2006, Eq. 2, without the misprinted 1/n), from the vertical field of view.
+    /// Width of one pixel (of its image beam) at a distance of one metre, metres, from the vertical
+    /// field of view. w_i(z) of Lloyd et al. 2006, Eq. 2, without the misprinted 1/n, is this value
+    /// times z.
     pub fn pixel_width_per_depth(&self) -> f64 {
         2.0 * self.tan_half_fov_y() / f64::from(self.image[1])
     }
 
-    /// The vector from the eye through a point of the picture, of unit *depth* (not unit length).
-    /// `pixel` is (0, 0) at the upper left corner and `image()` at the lower right.
+    /// The vector from the eye through a point of the image, whose *depth* is 1 (not its length).
+    /// `pixel` is (0, 0) at the upper left corner and `image()` at the lower right one.
     pub fn ray(&self, pixel: DVec2) -> DVec3 {
         let x = pixel.x / f64::from(self.image[0]);
         let y = 1.0 - pixel.y / f64::from(self.image[1]);
@@ -290,8 +260,8 @@ impl Camera {
         self.right * slope.x + self.up * slope.y + self.forward
     }
 
-    /// Where a world point appears in the picture, in pixels as for [`ray`](Self::ray); `None`
-    /// for points not in front of the eye.
+    /// Position of a world point in the image, in pixels as for [`ray`](Self::ray); `None` for
+    /// points that are not in front of the eye.
     pub fn pixel(&self, world_position: DVec3) -> Option<DVec2> {
         let v = world_position - self.eye;
         let z = self.forward.dot(v);
@@ -302,8 +272,8 @@ impl Camera {
         })
     }
 
-    /// Gradients of [`pixel`](Self::pixel)'s two coordinates, pixels per metre; `None` for points not
-    /// in front of the eye.
+    /// Gradients of both coordinates of [`pixel`](Self::pixel), pixels per metre; `None` for points
+    /// that are not in front of the eye.
     pub(crate) fn pixel_gradients(&self, world_position: DVec3) -> Option<[DVec3; 2]> {
         let v = world_position - self.eye;
         let z = self.forward.dot(v);
@@ -315,13 +285,15 @@ impl Camera {
         })
     }
 
-    /// Slopes, right and up, of the frustum's edges: lower left, lower right, upper right, upper left.
+    /// Slopes to the right and upwards of the frustum's edges: lower left, lower right, upper
+    /// right, upper left.
     pub(crate) fn corner_slopes(&self) -> [DVec2; 4] {
         let (lo, hi) = (self.slope_min, self.slope_max);
         [lo, DVec2::new(hi.x, lo.y), hi, DVec2::new(lo.x, hi.y)]
     }
 
-    /// The frustum's corners at `depth`, relative to the eye, in the order of their slopes.
+    /// The frustum's corners at `depth`, relative to the eye, in the order of
+    /// [`corner_slopes`](Self::corner_slopes).
     pub(crate) fn corners_at(&self, depth: f64) -> [DVec3; 4] {
         self.corner_slopes()
             .map(|slope| (self.right * slope.x + self.up * slope.y + self.forward) * depth)
@@ -332,4 +304,53 @@ fn check_image(image: [u32; 2]) -> Result<(), Error> {
     check(image.iter().all(|&n| (1..=65536).contains(&n)), "camera.image", || {
         format!("must be 1 to 65536 pixels each way, is {}x{}", image[0], image[1])
     })
+}
+
+/// The near and far distance of a projection with the rows `z` and `w`, metres.
+fn depth_range(
+    z: DVec4,
+    w: DVec4,
+    clip_depth: ClipDepth,
+    shadow_distance: Option<f64>,
+) -> Result<[f64; 2], Error> {
+    let (sign, scale) = (w.z.signum(), w.z.abs());
+    // Clip depth at distance d is (z.z·sign·d + z.w)/(scale·d). Solved for d, it gives both ends
+    // of the depth range.
+    let distance_of = |ndc: f64| z.w / (ndc * scale - z.z * sign);
+    let low = match clip_depth {
+        ClipDepth::ZeroToOne => 0.0,
+        ClipDepth::MinusOneToOne => -1.0,
+    };
+    let [a, b] = [distance_of(low), distance_of(1.0)];
+    // Because of rounding, an infinite far plane comes out either as ±∞ or as a huge distance of
+    // either sign.
+    let huge = 1e9 * a.abs().min(b.abs());
+    check([a, b].iter().all(|&d| d > 0.0 || d < -huge), PROJECTION, || {
+        format!("has its near and far plane at {a} and {b}, not both before the viewer")
+    })?;
+    let finite = |d: f64| d > 0.0 && d < huge.min(1e12);
+    let (near, far) = match (finite(a), finite(b)) {
+        (true, true) => (a.min(b), a.max(b)),
+        (true, false) => (a, f64::INFINITY),
+        (false, true) => (b, f64::INFINITY),
+        (false, false) => {
+            return Err(Error::invalid(PROJECTION, "has no near plane in front of the viewer"));
+        }
+    };
+    let far = match shadow_distance {
+        None if far == f64::INFINITY => {
+            return Err(Error::invalid(
+                "camera.shadow_distance",
+                "is needed, because the projection has no far plane",
+            ));
+        }
+        None => far,
+        Some(d) => {
+            check(d > near, "camera.shadow_distance", || {
+                format!("must exceed the near distance {near}, is {d}")
+            })?;
+            far.min(d)
+        }
+    };
+    Ok([near, far])
 }

@@ -1,16 +1,16 @@
-//! What can cast into a map.
+//! The region from which casters can cast into a map.
 
 use crate::bounds::Plane;
 use crate::focus::Body;
 use crate::warp::LightSpace;
 use glam::{DVec2, DVec3};
 
-/// How near a plane must come to a body to bound it, as a share of the body's size.
+/// The largest distance between a plane and the body it bounds, as a share of the body's size.
 const TOUCH: f64 = 1e-6;
 
-/// Planes around all that can cast onto `body`: the body swept towards the light. Those of the planes
-/// `around` it that look away from the light and touch it, and one through every edge of its outline seen
-/// from the light.
+/// Appends planes around all that can cast onto `body`, which is the body swept towards the light:
+/// those planes of `around` that touch the body and whose inside lies towards the light, and one
+/// plane through every edge of the body's outline as the light sees it.
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
     around: impl Iterator<Item = Plane>,
@@ -19,7 +19,7 @@ pub(crate) fn caster_planes(
     outline: &mut Vec<DVec2>,
 ) {
     let size = body.size();
-    // Rounding must never lose a caster.
+    // The planes are moved outwards so that rounding never culls a caster.
     let slack = 1e-9 * size;
     let sweeps_inwards = |plane: &Plane| match space.apex {
         None => plane.normal.dot(space.y.truncate()) >= 0.0,
@@ -31,15 +31,16 @@ pub(crate) fn caster_planes(
     convex_outline(outline, body.vertices().iter().map(|&v| space.project(v).0));
     for (i, &a) in outline.iter().enumerate() {
         let b = outline[(i + 1) % outline.len()];
-        // The line through a and b in the light plane, as a covector over (x, z, w) of light space,
-        // positive to the left of a → b: inside.
+        // The line through a and b in the light plane, as a covector over light space's (x, z, w).
+        // It is positive on the left of a → b, which is the inside.
         let line = DVec3::new(a.y - b.y, b.x - a.x, a.x * b.y - b.x * a.y);
         let plane = space.x * line.x + space.z * line.y + space.w * line.z;
         let length = plane.truncate().length();
         if length > 0.0 {
             let plane = plane / length;
             let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
-            // An edge as short as rounding may point anywhere: better no plane than a wrong one.
+            // The direction of an edge as short as rounding is arbitrary. No plane is better than a
+            // wrong one.
             if body.vertices().iter().all(|&v| plane.distance(v) >= 0.0) {
                 planes.push(plane);
             }
@@ -56,7 +57,7 @@ fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
     if hull.len() < 3 {
         return;
     }
-    // The chain is built behind the sorted points, which then go.
+    // The chain is appended to the sorted points, which are removed afterwards.
     let n = hull.len();
     let mut chain = |indices: &mut dyn Iterator<Item = usize>| {
         let start = hull.len();

@@ -1,22 +1,24 @@
-//! The body B of what the camera sees (Wimmer et al. 2004, §3.3), in local space.
+//! The body B of the receivers that the camera sees (Wimmer et al. 2004, §3.3), in local space.
 
 use crate::bounds::{Aabb, Plane};
 use crate::camera::Camera;
 use crate::math::range;
 use glam::DVec3;
 
-/// Convex polyhedra as vertices and faces, all cut down by the same planes: one around everything seen, or
-/// one for each box of receivers. Its buffers are kept from frame to frame.
+/// Convex polyhedra as vertices and faces, all clipped by the same planes: one polyhedron around
+/// everything seen, or one for each box of receivers. The buffers are kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Body {
     vertices: Vec<DVec3>,
     faces: Vec<Face>,
-    /// Vertex indices of all faces, one loop after the other, counter-clockwise from outside.
+    /// Vertex indices of all faces, one loop after the other, counter-clockwise as seen from
+    /// outside.
     loops: Vec<u32>,
     buffers: Buffers,
 }
 
-/// `loops[start..start + len]`, with the plane whose inside is the body's.
+/// The face with the corners `loops[start..start + len]`, and its plane, whose inside contains the
+/// body.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     plane: Plane,
@@ -27,11 +29,11 @@ struct Face {
 #[derive(Clone, Debug, Default)]
 struct Buffers {
     distances: Vec<f64>,
-    /// Where kept vertices went; `u32::MAX` for those that no kept face has.
+    /// The new index of each vertex that is kept; `u32::MAX` for vertices of no face that is kept.
     moved: Vec<u32>,
-    /// Edges cut by the plane (lower, higher old index) and the new vertex on each.
+    /// Edges cut by the plane (smaller and larger old index) and the new vertex on each.
     cuts: Vec<(u32, u32, u32)>,
-    /// Edges of the new face, in its own sense of rotation.
+    /// Edges of the new face, in its own orientation.
     rim: Vec<(u32, u32)>,
     on_plane: Vec<bool>,
     vertices: Vec<DVec3>,
@@ -40,31 +42,32 @@ struct Buffers {
 }
 
 impl Body {
-    /// Starts over with the camera's frustum, relative to the eye.
+    /// Replaces the body by the camera's frustum, relative to the eye.
     pub(crate) fn set_frustum(&mut self, camera: &Camera) {
         self.clear();
         self.vertices.extend(camera.corners_at(camera.near()));
         self.vertices.extend(camera.corners_at(camera.far()));
-        // Near corners are 0–3, far ones 4–7: lower left, lower right, upper right, upper left.
+        // Near corners are 0–3, far corners 4–7, in the order lower left, lower right, upper
+        // right, upper left.
         let faces =
             [[0, 1, 2, 3], [5, 4, 7, 6], [1, 0, 4, 5], [2, 1, 5, 6], [3, 2, 6, 7], [0, 3, 7, 4]];
         for (i, face) in faces.into_iter().enumerate() {
             let [a, b, c] = [face[0], face[1], face[2]].map(|i: u32| self.vertices[i as usize]);
             let normal = (c - b).cross(b - a).normalize();
-            // The side planes pass through the eye itself.
+            // The side planes pass through the eye exactly.
             let through = if i < 2 { a } else { DVec3::ZERO };
             self.push_face(Plane::through(through, normal), &face);
         }
     }
 
-    /// Starts over with another body's shape. (`Clone::clone_from` would not keep the buffers.)
+    /// Replaces the body by a copy of another. (`Clone::clone_from` would not keep the buffers.)
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.vertices.clone_from(&other.vertices);
         self.faces.clone_from(&other.faces);
         self.loops.clone_from(&other.loops);
     }
 
-    /// Adds all of another body's polyhedra.
+    /// Appends all polyhedra of another body.
     pub(crate) fn append(&mut self, other: &Self) {
         let (vertices, start) = (self.vertices.len() as u32, self.loops.len());
         self.vertices.extend_from_slice(&other.vertices);
@@ -78,7 +81,7 @@ impl Body {
         self.loops.clear();
     }
 
-    /// Starts over with a box (local space), given by its [`sides`](Self::sides).
+    /// Replaces the body by a box (local space), given by its [`sides`](Self::sides).
     pub(crate) fn set_box(&mut self, sides: [Plane; 6]) {
         self.clear();
         let min = DVec3::from([0, 2, 4].map(|i| -sides[i].offset));
@@ -100,12 +103,12 @@ impl Body {
         &self.vertices
     }
 
-    /// Largest coordinate of any vertex, metres: how far from the eye digits have to reach.
+    /// Largest coordinate of any vertex, metres, which determines the rounding of positions.
     pub(crate) fn size(&self) -> f64 {
         range(self.vertices.iter().map(|v| v.abs().max_element())).1.max(0.0)
     }
 
-    /// A point amid the body; `None` if it is empty.
+    /// The centre of the body's bounding box; `None` if the body is empty.
     pub(crate) fn middle(&self) -> Option<DVec3> {
         (!self.is_empty()).then(|| Aabb::around(self.vertices.iter().copied()).center())
     }
@@ -114,14 +117,15 @@ impl Body {
         self.vertices.is_empty()
     }
 
-    /// Planes of all faces, insides inwards.
+    /// Planes of all faces, with their insides towards the body.
     pub(crate) fn planes(&self) -> impl Iterator<Item = Plane> {
         self.faces.iter().map(|f| f.plane)
     }
 
-    /// Every edge once, as indices of vertices.
+    /// Every edge once, as vertex indices.
     pub(crate) fn edges(&self) -> impl Iterator<Item = [usize; 2]> {
-        // Neighbouring faces run along their common edge in opposite directions.
+        // Neighbouring faces traverse their common edge in opposite directions, so each edge is
+        // counted in one of them.
         self.faces.iter().flat_map(|f| {
             let corners = self.corners(f);
             (0..f.len)
@@ -131,7 +135,7 @@ impl Body {
         })
     }
 
-    /// The surface as triangles, as indices of vertices.
+    /// Triangles that make up the surface, as vertex indices.
     pub(crate) fn triangles(&self) -> impl Iterator<Item = [usize; 3]> {
         self.faces.iter().flat_map(|f| {
             let corners = self.corners(f);
@@ -145,7 +149,7 @@ impl Body {
         &self.loops[face.start..face.start + face.len]
     }
 
-    /// Cuts off what lies outside `aabb` (local space).
+    /// Removes what lies outside `aabb` (local space).
     pub(crate) fn clip_aabb(&mut self, aabb: Aabb) {
         if aabb.is_empty() {
             self.clear();
@@ -154,10 +158,10 @@ impl Body {
         self.sides(aabb).into_iter().for_each(|side| self.clip(side));
     }
 
-    /// The planes around a box, as far as this body is concerned.
+    /// The planes around a box, thick enough to clip this body.
     pub(crate) fn sides(&self, aabb: Aabb) -> [Plane; 6] {
-        // A flat box, a ground plane say, gets a thickness far below what single precision
-        // resolves at its distance, so that the body keeps an inside.
+        // A flat box, such as a ground plane, gets a thickness far below the resolution of single
+        // precision at its distance, so that the clipped body has an inside.
         let farthest = aabb.min.abs().max(aabb.max.abs()).max_element();
         let pad = 1e-7 * farthest.min(self.size());
         std::array::from_fn(|i| {
@@ -170,13 +174,12 @@ impl Body {
         })
     }
 
-    /// Cuts off what lies outside `plane`.
+    /// Removes what lies outside `plane`.
     pub(crate) fn clip(&mut self, plane: Plane) {
         let scale = self.size();
-        // Vertices this close to the plane count as on it: no slivers below rounding.
+        // Vertices this close to the plane count as on it, so that no slivers arise from rounding.
         let tolerance = 1e-13 * scale.max(plane.offset.abs());
-        let Buffers { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
-            &mut self.buffers;
+        let distances = &mut self.buffers.distances;
         distances.clear();
         distances.extend(self.vertices.iter().map(|&v| {
             let d = plane.distance(v);
@@ -189,6 +192,18 @@ impl Body {
             self.clear();
             return;
         }
+        self.cut_faces();
+        self.buffers.close_cuts(plane);
+        let Buffers { vertices, faces, loops, .. } = &mut self.buffers;
+        std::mem::swap(&mut self.vertices, vertices);
+        std::mem::swap(&mut self.faces, faces);
+        std::mem::swap(&mut self.loops, loops);
+    }
+
+    /// Copies the inside parts of all faces to the buffers, and collects the edges along the cuts.
+    fn cut_faces(&mut self) {
+        let Buffers { distances, moved, cuts, rim, on_plane, vertices, faces, loops } =
+            &mut self.buffers;
         vertices.clear();
         faces.clear();
         loops.clear();
@@ -200,8 +215,8 @@ impl Body {
         for face in &self.faces {
             let corners = &self.loops[face.start..face.start + face.len];
             if corners.iter().all(|&i| distances[i as usize] <= 0.0) {
-                // Cut off. Or all of it on the plane: then a new face takes its place, if there is
-                // anything of its polyhedron inside.
+                // The face is cut off, or lies entirely on the plane. In the latter case a new face
+                // replaces it if part of its polyhedron is inside.
                 continue;
             }
             let start = loops.len();
@@ -219,7 +234,8 @@ impl Body {
                 let (lo, hi) = (a.min(b), a.max(b));
                 let (d_lo, d_hi) = (distances[lo as usize], distances[hi as usize]);
                 if d_lo * d_hi < 0.0 {
-                    // Neighbouring faces of a polyhedron lie near each other.
+                    // The neighbouring face that cut the same edge belongs to the same polyhedron,
+                    // so it was visited recently.
                     let known = cuts.iter().rev().find(|c| (c.0, c.1) == (lo, hi)).map(|c| c.2);
                     loops.push(known.unwrap_or_else(|| {
                         let index = vertices.len() as u32;
@@ -240,7 +256,13 @@ impl Body {
                 }
             }
         }
-        // One new face for each polyhedron that was cut.
+    }
+}
+
+impl Buffers {
+    /// Closes the polyhedra that `plane` cut, each with one new face.
+    fn close_cuts(&mut self, plane: Plane) {
+        let Self { rim, faces, loops, .. } = self;
         while let Some((first, mut at)) = rim.pop() {
             let start = loops.len();
             loops.push(first);
@@ -258,9 +280,6 @@ impl Body {
                 loops.truncate(start);
             }
         }
-        std::mem::swap(&mut self.vertices, vertices);
-        std::mem::swap(&mut self.faces, faces);
-        std::mem::swap(&mut self.loops, loops);
     }
 }
 
@@ -316,8 +335,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Clipping finds all corners that brute force finds, and no others; faces close up: every edge
-        /// belongs to two of them (Euler: V − E + F = 2).
+        /// Clipping finds the same corners as brute force. The faces are closed: every edge belongs
+        /// to two of them (Euler: V − E + F = 2).
         #[test]
         fn clipping_agrees_with_brute_force(
             cuts in proptest::collection::vec(plane(), 0..8),
@@ -326,7 +345,7 @@ mod tests {
             let mut body = Body::default();
             body.set_frustum(&camera());
             let mut planes: Vec<Plane> = body.planes().collect();
-            // Sometimes all that is left is a floor of hardly any thickness.
+            // Some bodies are clipped to a floor of hardly any thickness.
             let slab = floor.map(|y| [(DVec3::Y, 1e-6 - y), (DVec3::NEG_Y, 1e-6 + y)]);
             let slab = slab.into_iter().flatten().map(|(normal, offset)| Plane { normal, offset });
             for cut in slab.chain(cuts) {
@@ -349,8 +368,8 @@ mod tests {
         }
     }
 
-    /// A box: anywhere, or on a lattice, where boxes touch one another and the planes that cut them; some
-    /// without thickness.
+    /// A box at any position, or on a lattice, where boxes touch each other and the planes that
+    /// clip them. Some boxes are flat.
     fn some_box() -> impl Strategy<Value = Aabb> {
         let anywhere = prop::array::uniform2(prop::array::uniform3(-9.0..9.0f64));
         let lattice = prop::array::uniform2(prop::array::uniform3(-3i32..=3))
@@ -367,8 +386,8 @@ mod tests {
         prop_oneof![plane(), lattice]
     }
 
-    /// How many separate closed surfaces the faces make up. Every edge must run along two of them, once
-    /// each way, and every vertex belong to three or more.
+    /// The number of separate closed surfaces that the faces make up. Checks that every edge
+    /// belongs to two faces, once in each direction, and every vertex to three or more.
     fn closed_surfaces(body: &Body) -> Result<usize, TestCaseError> {
         let mut ways = std::collections::HashMap::new();
         let mut root: Vec<usize> = (0..body.vertices().len()).collect();
@@ -399,7 +418,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 5000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Boxes cut together are those cut one by one.
+        /// Boxes clipped together are the same as boxes clipped one by one.
         #[test]
         fn many_boxes_are_cut_as_each_alone(
             boxes in proptest::collection::vec(some_box(), 1..8),
@@ -435,7 +454,7 @@ mod tests {
             for &v in together.vertices() {
                 prop_assert!(nearest(v, &expected) < 1e-9, "{v} is too much");
             }
-            // Euler's formula once for each.
+            // Euler's formula holds for each polyhedron.
             let (v, e, f) = (expected.len(), together.edges().count(), together.planes().count());
             prop_assert_eq!(together.vertices().len(), v);
             prop_assert_eq!(closed_surfaces(&together)?, alone.len());

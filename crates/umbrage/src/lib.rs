@@ -1,14 +1,17 @@
-//! Plans shadow maps with *known* error.
+#![doc = include_str!("../README.md")]
 //!
-//! From a camera, a light and the bounds of what casts and receives shadows, a [`Planner`]
-//! computes a [`Plan`]: for every shadow map its matrix, its resolution, the depth range it serves,
-//! planes to cull its casters with, and the aliasing error it has. A plan is inert data; a GPU
-//! renderer, the CPU reference or your own engine can execute it.
+//! # What there is
 //!
-//! The crate is pure: no GPU, no files, no `unsafe`, no global state, and no allocation in a steady
-//! frame. Same input, same output.
-//!
-//! [`theory`] has the closed forms of the papers behind it.
+//! - A [`Technique`] says which maps there are, how their texels are spread and how they are looked
+//!   up. It is also a text, which parses and prints; [`language`] lists the words.
+//! - A [`Planner`] computes a [`Plan`] for a [`Camera`], its [`Light`]s, the [`Bounds`] of what casts
+//!   and receives shadows, and a technique.
+//! - Each [`ShadowMap`] of a plan has its matrix, its resolution, the depth range that it serves,
+//!   planes to cull its casters with, and the error that it has ([`MapError`]). [`aliasing`] tells
+//!   the error at any point.
+//! - An [`Atlas`] gives every map a place in one texture.
+//! - [`visibility`] has the shadow test and its filters, on the CPU.
+//! - [`theory`] has the closed forms of the papers behind it all.
 //!
 //! # Conventions
 //!
@@ -19,15 +22,15 @@
 //! - A transform is named `dst_from_src`. Matrices multiply column vectors.
 //! - *Local space* is world space moved by a plan's [`origin`](Plan::origin), so that single
 //!   precision suffices far from the world's origin.
-//! - *Light space* has +y towards the light, z perpendicular to it in the plane of view direction and
-//!   light, on the viewer's forward side, and x = z × y to his right (left-handed, as in Wimmer et al.
-//!   2004, §3.4). For a spot light this is the space after the light's own perspective.
-//! - *Shadow space* is (s, t, depth): s across and t along the warp's axis, both in [0, 1]; depth in
-//!   [0, 1] with 0 nearest the light. Texel (i, j) of a map of `res` texels has its centre at
+//! - *Light space* has +y towards the light, z perpendicular to it in the plane of view direction
+//!   and light, on the viewer's forward side, and x = z × y to his right (left-handed, as in Wimmer
+//!   et al. 2004, §3.4). For a spot light this is the space after the light's own perspective.
+//! - *Shadow space* is (s, t, depth): s across and t along the warp's axis, both in [0, 1]; depth
+//!   in [0, 1] with 0 nearest the light. Texel (i, j) of a map of `res` texels has its centre at
 //!   ((i + ½)/res.x, (j + ½)/res.y).
-//! - Symbols are those of the papers: n, f for the near and far distance, φ for half a field of view,
-//!   θ for the angle between view and light direction, λ for the distance from the warp's centre of
-//!   projection to its near plane, μ for the warp's depth range.
+//! - Symbols are those of the papers: n, f for the near and far distance, φ for half a field of
+//!   view, θ for the angle between view and light direction, λ for the distance from the warp's
+//!   centre of projection to its near plane, μ for the warp's depth range.
 
 pub mod aliasing;
 mod atlas;
@@ -63,7 +66,5 @@ pub use planner::Planner;
 pub use technique::language;
 pub use technique::{Cover, Faces, Limits, Objective, Partition, Size, Splits, Technique, Warp};
 
-/// The README's examples are tests.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;
+// Its types are in this API: whoever names them by this path has the version that fits.
+pub use glam;

@@ -7,9 +7,9 @@ use glam::DVec3;
 /// A light that casts shadows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// Parallel light, such as the sun's.
+    /// Parallel light, such as sunlight.
     Directional {
-        /// The way the light travels; any non-zero length.
+        /// Direction in which the light travels, of any non-zero length.
         direction: DVec3,
     },
     /// A cone of light from one point.
@@ -18,39 +18,39 @@ pub enum Light {
     Point(PointLight),
 }
 
-/// Light from one point in all directions. Its maps are those of six spot lights that look through the
-/// sides of a cube.
+/// Light from one point in all directions. Its maps are those of six spot lights, one through each
+/// side of a cube aligned with the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// World space, metres.
+    /// Position in world space, metres.
     pub position: DVec3,
-    /// Distance from the light, measured along the nearest axis of the world, at which shadows begin,
-    /// metres, ≥ 1e-12. Receivers nearer than this get no shadow; casters nearer than this cast onto
-    /// those beyond.
+    /// Distance from the light, along the nearest world axis, at which shadows begin, metres, ≥
+    /// 1e-12. Receivers nearer than this get no shadow; casters nearer than this cast shadows onto
+    /// receivers beyond.
     pub near: f64,
-    /// Distance at which light ends, metres, > `near`.
+    /// Distance along the nearest world axis at which the light ends, metres, > `near`.
     pub range: f64,
 }
 
 /// A cone of light from one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
-    /// World space, metres.
+    /// Position in world space, metres.
     pub position: DVec3,
-    /// Axis of the cone, the way the light travels; any non-zero length.
+    /// Axis of the cone: the direction in which the light travels, of any non-zero length.
     pub direction: DVec3,
-    /// Half the cone's opening angle, radians, in (0, 85°]. Nothing outside is lit.
+    /// Half the cone's opening angle, radians, in (0, 85°]. Points outside the cone are not lit.
     pub half_angle_rad: f64,
-    /// Distance from the light, measured along the axis, at which shadows begin, metres, ≥ 1e-12.
-    /// Receivers nearer than this get no shadow; casters nearer than this cast onto those beyond.
+    /// Distance from the light along the axis at which shadows begin, metres, ≥ 1e-12. Receivers
+    /// nearer than this get no shadow; casters nearer than this cast shadows onto receivers beyond.
     pub near: f64,
-    /// Distance along the axis at which light ends, metres, > `near`.
+    /// Distance along the axis at which the light ends, metres, > `near`.
     pub range: f64,
 }
 
 impl Light {
-    /// Unit vector from a world point towards the light. At a spot light's own position the
-    /// direction against its axis.
+    /// Unit vector from a world point towards the light. At the position of a spot light it is
+    /// opposite to the axis, at that of a point light +y.
     pub fn direction_to_light(&self, world_position: DVec3) -> DVec3 {
         match self {
             Self::Directional { direction } => -direction.normalize_or_zero(),
@@ -63,27 +63,33 @@ impl Light {
         }
     }
 
-    /// The light as lights that one map can look from: a point light as the six pyramids of a cube,
-    /// any other as itself. The light must be checked.
-    pub(crate) fn lamps(self) -> impl Iterator<Item = (Option<CubeSide>, Lamp)> {
+    /// The projections that make up the light, each with its own maps: six pyramids for a point
+    /// light, one projector for any other light. The light must have been [checked](Self::checked).
+    pub(crate) fn projectors(self) -> impl Iterator<Item = (Option<CubeSide>, Projector)> {
         let is_point = matches!(self, Self::Point(_));
         (0..if is_point { 6 } else { 1 }).map(move |i| {
             let side = is_point.then(|| CubeSide::ALL[i]);
-            let lamp = match self {
-                Self::Directional { direction } => Lamp::Directional { direction },
+            let projector = match self {
+                Self::Directional { direction } => Projector::Directional { direction },
                 Self::Spot(SpotLight { position, direction, half_angle_rad, near, range }) => {
-                    Lamp::Pyramid { position, direction, slope: half_angle_rad.tan(), near, range }
+                    Projector::Pyramid {
+                        position,
+                        direction,
+                        slope: half_angle_rad.tan(),
+                        near,
+                        range,
+                    }
                 }
                 Self::Point(PointLight { position, near, range }) => {
                     let direction = side.map_or(DVec3::Y, CubeSide::direction);
-                    Lamp::Pyramid { position, direction, slope: 1.0, near, range }
+                    Projector::Pyramid { position, direction, slope: 1.0, near, range }
                 }
             };
-            (side, lamp)
+            (side, projector)
         })
     }
 
-    /// The same light with unit directions, or what is wrong with it.
+    /// The same light with unit directions, or an error that names the field at fault.
     pub(crate) fn checked(&self) -> Result<Self, Error> {
         let check_point = |position: DVec3, near: f64, range: f64| {
             check_position(position, "light.position")?;
@@ -117,11 +123,11 @@ impl Light {
 }
 
 impl CubeSide {
-    /// All six.
+    /// All six sides.
     pub const ALL: [Self; 6] =
         [Self::PosX, Self::NegX, Self::PosY, Self::NegY, Self::PosZ, Self::NegZ];
 
-    /// The way it looks, unit vector.
+    /// Unit vector from the light through the middle of the side.
     pub fn direction(self) -> DVec3 {
         match self {
             Self::PosX => DVec3::X,
@@ -134,14 +140,14 @@ impl CubeSide {
     }
 }
 
-/// A light that one map can look from, with a unit direction.
+/// Light that one projection covers: a parallel beam or a pyramid, with a unit direction.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Lamp {
+pub(crate) enum Projector {
     Directional {
         direction: DVec3,
     },
-    /// What shines out of one point into a pyramid with a square base: `slope` is half the base's width
-    /// over the height.
+    /// Light from one point into a pyramid with a square base. `slope` is half the width of the
+    /// base over the height.
     Pyramid {
         position: DVec3,
         direction: DVec3,
@@ -151,14 +157,15 @@ pub(crate) enum Lamp {
     },
 }
 
-/// A pyramid's near distance, but far enough from the apex to be told from it among coordinates as large
-/// as `size`, metres: at the apex itself there is no map.
+/// A pyramid's near distance, increased where it would vanish by rounding among coordinates as
+/// large as `size`, metres: no map is defined at the apex itself.
 fn near_end(near: f64, apex: DVec3, size: f64) -> f64 {
     near.max(1e-11 * apex.length().max(size))
 }
 
-impl Lamp {
-    /// The way it shines, and the position of a pyramid's apex relative to `origin` (world space).
+impl Projector {
+    /// Direction in which the light travels, and for a pyramid the position of its apex relative to
+    /// `origin` (world space).
     pub(crate) fn direction_and_apex(&self, origin: DVec3) -> (DVec3, Option<DVec3>) {
         match *self {
             Self::Directional { direction } => (direction, None),
@@ -166,8 +173,9 @@ impl Lamp {
         }
     }
 
-    /// The four sides of a pyramid, then its near and far end, relative to `origin` (world space); none
-    /// for directional lights. What is to be clipped reaches as far as `size`, metres.
+    /// A pyramid's four side planes, then its near and its far plane, relative to `origin` (world
+    /// space); `None` for parallel light. `size` is the largest coordinate of what the planes are
+    /// to clip, metres.
     pub(crate) fn frustum(&self, origin: DVec3, size: f64) -> Option<[Plane; 6]> {
         let Self::Pyramid { position, direction: axis, slope, near, range } = *self else {
             return None;
@@ -185,8 +193,8 @@ impl Lamp {
         ])
     }
 
-    /// Corners of a pyramid between its near and far end, relative to `origin` (world space); none for
-    /// directional lights.
+    /// Corners of a pyramid at its near and its far plane, relative to `origin` (world space);
+    /// `None` for parallel light.
     pub(crate) fn corners(&self, origin: DVec3) -> Option<[DVec3; 8]> {
         let Self::Pyramid { position, direction, slope, near, range } = *self else {
             return None;

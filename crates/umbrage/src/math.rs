@@ -1,23 +1,24 @@
-//! Small pieces that several modules share.
+//! Small functions that several modules share.
 
 use glam::DVec3;
 
-/// Least and largest of some values; (∞, −∞) without any.
+/// The smallest and the largest of the values; (∞, −∞) if there are none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values
         .into_iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
 }
 
-/// Largest singular value of the matrix with two given columns, from their squared lengths and
-/// their dot product.
+/// Larger singular value of the matrix with two columns, from their squared lengths and their dot
+/// product.
 pub(crate) fn largest_stretch(a_squared: f64, b_squared: f64, dot: f64) -> f64 {
     let half_difference = (a_squared - b_squared) / 2.0;
     (a_squared.midpoint(b_squared) + (half_difference * half_difference + dot * dot).sqrt()).sqrt()
 }
 
-/// Two unit vectors perpendicular to a unit vector and to each other: the x and z axes, turned along
-/// as −y is turned to `axis`. They follow `axis` smoothly everywhere but at +y itself (Frisvad 2012).
+/// Two unit vectors perpendicular to a unit vector and to each other: the images of the x and z
+/// axes under the rotation that takes −y to `axis`. They depend smoothly on `axis` everywhere but
+/// at +y (Frisvad 2012).
 pub(crate) fn perpendicular_pair(axis: DVec3) -> [DVec3; 2] {
     let denominator = 1.0 - axis.y;
     if denominator < 1e-12 {

@@ -1,26 +1,27 @@
-//! Which part of what is seen goes to which map (Lloyd et al. 2006, §5).
+//! Which part of the view each map serves (Lloyd et al. 2006, §5).
 
 use crate::bounds::Plane;
 use crate::camera::Camera;
-use crate::light::Lamp;
+use crate::light::Projector;
 use crate::plan::Face;
 use crate::technique::{Partition, Splits};
 use glam::{DVec3, DVec4};
 
-/// The ends of slices; those beyond the last one are not used.
+/// The ends of slices; entries after the last slice's end are not used.
 pub(crate) type Ends = [f64; Partition::MAX_SLICES + 1];
 
-/// How the view frustum's faces lie to a light, in local space. The faces that together cover what the
-/// light sees of the frustum, each once, are its front faces if the light comes from behind the viewer,
-/// else its back faces (W&P §5.1); the near face is among them either way.
+/// The view frustum's faces as seen from a light, in local space. A partition uses those faces that
+/// together cover what the light sees of the frustum exactly once: its front faces if the light
+/// comes from behind the viewer, otherwise its back faces (W&P §5.1). The near face is among them
+/// in both cases.
 ///
-/// A face's part of space is a wedge around the line from the eye to the light, between the two planes
-/// through that line and the face's side edges. Wedges end nowhere, so that rounding at the frustum's
-/// outline loses nobody.
+/// A face serves a wedge around the line from the eye to the light, between the two planes through
+/// that line and the face's side edges. Wedges extend to infinity, so that rounding at the
+/// frustum's outline excludes no receiver.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Faces {
-    /// From the eye through the frustum's corners, unit depth: lower left, lower right, upper right, upper
-    /// left. Face i lies between corners i and i + 1.
+pub(crate) struct LitFaces {
+    /// Vectors from the eye through the frustum's corners, of depth 1: lower left, lower right,
+    /// upper right, upper left. Face i lies between corners i and i + 1.
     rays: [DVec3; 4],
     light: DVec4,
     is_used: [bool; 4],
@@ -28,12 +29,13 @@ pub(crate) struct Faces {
     near: Option<f64>,
 }
 
-/// Faces that see the light under a smaller slope than this are edge-on: their part is empty.
+/// Sine of the angle between a face and the light below which the face is edge-on and serves
+/// nothing.
 const EDGE_ON: f64 = 1e-12;
 
-impl Faces {
-    pub(crate) fn new(camera: &Camera, lamp: &Lamp, with_near: bool) -> Self {
-        let light = homogeneous(lamp, camera);
+impl LitFaces {
+    pub(crate) fn new(camera: &Camera, projector: &Projector, with_near: bool) -> Self {
+        let light = homogeneous(projector, camera);
         let rays = camera.corners_at(1.0);
         let towards = light.truncate();
         let along_view = camera.forward().dot(towards);
@@ -43,7 +45,7 @@ impl Faces {
             let inside = inwards.dot(towards) / towards.length();
             if is_behind { inside < -EDGE_ON } else { inside > EDGE_ON }
         });
-        // The near face is one of those used unless it is edge-on or a lamp stands before it.
+        // The near face is used unless it is edge-on or a lamp stands in front of it.
         let over_near = along_view - camera.near() * light.w;
         let sees_near =
             if is_behind { over_near } else { -over_near } < -EDGE_ON * towards.length();
@@ -51,10 +53,10 @@ impl Faces {
         Self { rays, light, is_used, near }
     }
 
-    /// Appends the planes around a face's part of space; `false` if it has none.
+    /// Appends the planes around the space that a face serves; `false` if the face serves nothing.
     pub(crate) fn cell(&self, face: Face, planes: &mut Vec<Plane>) -> bool {
         let Some(side) = self.side(face) else {
-            // Before the near edges of all the faces used.
+            // The near face serves the space in front of the near edges of all other faces used.
             let ends =
                 self.used().filter_map(|i| self.near.and_then(|n| self.sides(i).plane_at(n)));
             planes.extend(ends.map(Plane::flipped));
@@ -66,7 +68,8 @@ impl Faces {
         }
         let middle = side.middle();
         for (neighbour, ray) in [((i + 3) % 4, side.a), ((i + 1) % 4, side.b)] {
-            // Where the neighbour has no part, this one reaches to the outline and beyond.
+            // Where the neighbouring face serves nothing, this one extends to the outline and
+            // beyond.
             let normal = ray.cross(self.light.truncate()).try_normalize();
             if let Some(normal) = normal.filter(|_| self.is_used[neighbour]) {
                 let sign = normal.dot(middle).signum();
@@ -77,7 +80,7 @@ impl Faces {
         true
     }
 
-    /// A side face; `None` for the near face.
+    /// The geometry of a side face; `None` for the near face.
     pub(crate) fn side(&self, face: Face) -> Option<Side> {
         (face != Face::Near).then(|| self.sides(face as usize))
     }
@@ -92,35 +95,35 @@ impl Faces {
 }
 
 /// The light as a homogeneous local point.
-fn homogeneous(lamp: &Lamp, camera: &Camera) -> DVec4 {
-    match lamp.direction_and_apex(camera.eye()) {
+fn homogeneous(projector: &Projector, camera: &Camera) -> DVec4 {
+    match projector.direction_and_apex(camera.eye()) {
         (direction, None) => -direction.extend(0.0),
         (_, Some(apex)) => apex.extend(1.0),
     }
 }
 
-/// A side face of the view frustum and a light.
+/// A side face of the view frustum, with the light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Side {
-    /// From the eye along the face's side edges, unit depth.
+    /// Vectors from the eye along the face's two side edges, of depth 1.
     a: DVec3,
     b: DVec3,
     light: DVec4,
 }
 
 impl Side {
-    /// From the eye along the middle of the face, unit depth.
+    /// Vector from the eye along the middle of the face, of depth 1.
     fn middle(&self) -> DVec3 {
         self.a.midpoint(self.b)
     }
 
-    /// From the eye along the face's side edges, unit depth.
+    /// Vectors from the eye along the face's two side edges, of depth 1.
     pub(crate) fn edges(&self) -> [DVec3; 2] {
         [self.a, self.b]
     }
 
-    /// What lies farther than `depth` on the face: the half-space through the line there and the light.
-    /// `None` if the light stands on that line.
+    /// The half-space beyond `depth` on the face, whose plane contains the face's line at this
+    /// depth and the light. `None` if the light lies on that line.
     fn plane_at(&self, depth: f64) -> Option<Plane> {
         let on_line = self.a * depth;
         let to_light = self.light.truncate() - on_line * self.light.w;
@@ -129,30 +132,31 @@ impl Side {
         Some(Plane::through(on_line, normal * sign))
     }
 
-    /// View depth at which the beam through `p` meets the face; infinite where it does not.
+    /// View depth at which the beam through `p` meets the face; infinite if it does not.
     fn depth_of(&self, p: DVec3, camera: &Camera) -> f64 {
         let normal = self.a.cross(self.b);
         let towards = self.light.truncate() - p * self.light.w;
         let meets = p - towards * (normal.dot(p) / normal.dot(towards));
         let depth = camera.forward().dot(meets);
-        // Beams through the line from the eye to the light meet the face in the eye.
+        // Beams that cross the line from the eye to the light meet the face at the eye.
         let is_before = depth > -1e-9 * p.length();
         if depth.is_finite() && is_before { depth.max(0.0) } else { f64::INFINITY }
     }
 }
 
-/// What slices are counted along.
+/// The direction along which slices follow each other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Along {
-    /// The view.
+    /// Slices along the view, between planes of constant view depth.
     View,
-    /// A side face of the view frustum. So that no map reaches behind another's, a slice is what lies in
-    /// the beams through its part of the face, not what lies between two view distances.
+    /// Slices along a side face of the view frustum. A slice consists of the beams through its part
+    /// of the face, and not of what lies between two view depths, so that no map needs to cover
+    /// what lies behind another's part.
     Side(Side),
 }
 
 impl Along {
-    /// What lies farther than `depth`.
+    /// The half-space beyond `depth`.
     pub(crate) fn plane_at(&self, depth: f64, camera: &Camera) -> Option<Plane> {
         match self {
             Self::View => Some(Plane { normal: camera.forward(), offset: -depth }),
@@ -160,7 +164,7 @@ impl Along {
         }
     }
 
-    /// Where a local point counts, metres along the view.
+    /// The depth by which a local point is assigned to a slice, metres along the view.
     pub(crate) fn depth_of(&self, p: DVec3, camera: &Camera) -> f64 {
         match self {
             Self::View => camera.forward().dot(p),
@@ -169,8 +173,8 @@ impl Along {
     }
 }
 
-/// Where slices between `n` and `f` begin and end. `storage` tells how many texels a slice needs, by
-/// any measure that grows with the slice.
+/// The ends of slices between `n` and `f`. `storage` gives the number of texels that a slice needs,
+/// or any measure of it that grows with the slice.
 pub(crate) fn split(
     partition: &Partition,
     [n, f]: [f64; 2],
@@ -195,15 +199,16 @@ pub(crate) fn split(
     ends
 }
 
-/// How alike the storage of fitted slices is, as a share. All but the last one are a thousand times as alike:
-/// each begins where the one before ends, and what is wrong with the first grows along the row.
+/// The share by which the storage of fitted slices may differ. All slices but the last are a
+/// thousand times as accurate, because each begins where the previous one ends and their errors
+/// accumulate.
 const FITTED: f64 = 1e-3;
 
-/// Moves all but the first and last end so that all slices need the same storage.
+/// Moves all but the first and the last end so that all slices need the same storage.
 ///
-/// Given what each may need, slices are laid one after the other from the near end; what they may need
-/// is right when the last one ends at the far end. Storage grows with a slice at both its ends, so both
-/// searches have one answer.
+/// For a given storage, slices are laid one after the other from the near end. The storage is right
+/// if the last slice then ends at the far end. A slice's storage is monotonic in both its ends, so
+/// both searches have a unique solution.
 fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
     let k = ends.len() - 1;
     let [n, f] = [ends[0], ends[k]];
@@ -211,8 +216,8 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
         return;
     }
     let most = storage(n, f).ln();
-    // Logarithm of what a slice needs over what it may. Far from 0 its size says nothing more: an empty
-    // slice needs nothing.
+    // Logarithm of a slice's storage over the allowed one. An empty slice needs no storage, so the
+    // logarithm is clamped; far from 0 its size does not matter.
     let mut over = |a: f64, b: f64, allowed: f64| (storage(a, b).ln() - allowed).clamp(-2.0, 2.0);
     let mut excess_of_last = |allowed: f64| {
         for i in 1..k {
@@ -228,7 +233,8 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
         }
         if ends[k - 1] >= f { -2.0 } else { over(ends[k - 1], f, allowed) }
     };
-    // All may be in the first slice; and at most how much less may be enough is not known.
+    // The first slice may need all of the storage, which gives an upper bound. A lower bound is
+    // found by trying.
     let mut least = most - 1.0;
     let mut at_least = excess_of_last(least);
     for step in [2.0, 4.0, 8.0, 16.0, 32.0] {
@@ -242,9 +248,10 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
     }
 }
 
-/// A root of a rising function between `lo` and `hi`, from its values there, to within `tolerance` in
-/// its value: false position with the Illinois correction, and halving every third step, because where a
-/// slice begins storage can be a cliff. The function's last call is at the root given.
+/// A root of an increasing function between `lo` and `hi`, given its values there, to within
+/// `tolerance` of the function's value. This is false position with the Illinois correction, but
+/// every third step bisects, because storage can be discontinuous where a slice begins. The
+/// function's last call is at the root returned.
 fn root(
     [mut lo, mut hi]: [f64; 2],
     [mut at_lo, mut at_hi]: [f64; 2],

@@ -4,62 +4,65 @@ use crate::visibility::Filter;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
 use std::ops::Range;
 
-/// What to render and how to look it up: the result of planning.
+/// The result of planning: which shadow maps to render and how to look them up.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
     /// World position of local space's origin, metres: the viewer's position.
     pub origin: DVec3,
-    /// The maps, light by light. Their number depends on the options and the lights' kinds alone, never
-    /// on where camera and lights are.
+    /// The maps, light by light. Their number depends on the technique and on the number and kinds
+    /// of the lights alone, never on where the camera and the lights are.
     pub maps: Vec<ShadowMap>,
-    /// What there is for each light, in their order.
+    /// The plan of each light, in the order of the lights.
     pub lights: Vec<PlannedLight>,
-    /// The filter that the maps are planned for: how far it reads beyond a map, and whether it asks
-    /// how far casters lie, decides which casters are drawn and where depths begin.
+    /// The filter that the maps are planned for. Its reach beyond a map's border decides which
+    /// casters are drawn; whether it needs the depths of distant casters decides where depths
+    /// begin.
     pub filter: Filter,
-    /// How wide a pixel of the viewer's picture is at a local point, metres: this times the point.
+    /// The dot product of this vector with a local point is the width of a pixel of the viewer's
+    /// image at that point, in metres.
     pub pixel_gradient: DVec3,
 }
 
-/// One light's share of a [`Plan`].
+/// The part of a [`Plan`] that belongs to one light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedLight {
-    /// Its maps' indices in [`Plan::maps`].
+    /// Indices of the light's maps in [`Plan::maps`].
     pub maps: Range<usize>,
-    /// Angle θ between view and light direction, radians, 0 ..= π. For spot and point lights at the
-    /// middle of what the camera sees in its light.
+    /// Angle θ between the view direction and the light direction, radians, 0 ..= π. For spot and
+    /// point lights the light direction is taken at the middle of what the camera sees in that
+    /// light.
     pub theta_rad: f64,
 }
 
-/// Which part of what the camera sees a map is for.
+/// Which part of the view a map serves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Part {
     /// Index of the light.
     pub light: usize,
     /// Side of the cube around a point light; `None` for other lights.
     pub side: Option<CubeSide>,
-    /// Face of the view frustum; `None`: all of it.
+    /// Face of the view frustum; `None` stands for the whole frustum.
     pub face: Option<Face>,
-    /// Slice along the view, from the viewer.
+    /// Index of the slice along the view, counted from the viewer.
     pub slice: usize,
 }
 
-/// A face of the view frustum, as in the picture.
+/// A face of the view frustum, named by its place in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Face {
-    /// Below the picture.
+    /// The face through the image's lower edge.
     Bottom,
-    /// Right of the picture.
+    /// The face through the image's right edge.
     Right,
-    /// Above the picture.
+    /// The face through the image's upper edge.
     Top,
-    /// Left of the picture.
+    /// The face through the image's left edge.
     Left,
-    /// Before the picture.
+    /// The near plane's face.
     Near,
 }
 
-/// A side of the cube around a point light: the direction in world space in which it looks.
+/// A side of the cube around a point light, named by the world axis that points through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they say it all")]
 pub enum CubeSide {
@@ -72,20 +75,22 @@ pub enum CubeSide {
 }
 
 impl Plan {
-    /// Texels of all maps together.
+    /// Number of texels of all maps together.
     pub fn texels(&self) -> u64 {
         self.maps.iter().map(ShadowMap::texels).sum()
     }
 
-    /// Storage factor S̄: texels that all maps need, in units of the image's height squared, for an
-    /// error of 1 pixel per texel in s and in t (Lloyd et al. 2006, Eq. 12, whose images are square).
+    /// Storage factor S̄: the number of texels that all maps together need for an error of 1 pixel
+    /// per texel in s and in t, in units of the image's height squared (Lloyd et al. 2006, Eq. 12,
+    /// where images are square).
     pub fn storage_factor(&self) -> f64 {
         self.maps.iter().map(|m| m.storage_factor).sum()
     }
 
-    /// A surface point with its plane, as one of the maps sees it. `world_normal` need not have unit
-    /// length and may point to either side. `None` as for [`ShadowMap::project`], on empty maps and
-    /// those that the plan does not have, and without a normal.
+    /// A surface point with its tangent plane, as the map of index `map` sees it. `world_normal`
+    /// may have any non-zero length and point to either side of the surface. `None` where
+    /// [`ShadowMap::project`] gives `None`, if the map is empty or does not exist, and if the
+    /// normal has no direction.
     pub fn receiver(
         &self,
         map: usize,
@@ -95,8 +100,9 @@ impl Plan {
         self.maps.get(map)?.receiver(world_position, world_normal, self.pixel_gradient)
     }
 
-    /// The maps that answer for a world point under a light, and the share of each. There is one, two
-    /// where slices overlap, and none where nothing is served. Shares add up to 1.
+    /// Indices of the maps that serve a world point under a light, each with its share of the
+    /// result. There is one map, there are two where slices overlap, and none where the plan serves
+    /// no receivers. The shares add up to 1.
     pub fn lookup(
         &self,
         light: usize,
@@ -115,33 +121,35 @@ impl Plan {
     }
 }
 
-/// The largest errors over the receivers that a map serves, pixels per texel. Upper bounds: under parallel
-/// light at most one per cent above the errors reached, under spot lights usually so.
+/// The largest errors over the receivers that a map serves, pixels per texel. They are upper
+/// bounds: under parallel light they are at most one per cent larger than the true maxima, and
+/// under spot lights this is usually so.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MapError {
-    /// Largest m_s: across the warp.
+    /// Largest m_s: the error across the warp's axis.
     pub max_s: f64,
-    /// Largest m_t: along the warp.
+    /// Largest m_t: the error along the warp's axis.
     pub max_t: f64,
-    /// Largest error in the worst direction, σ_max of a texel's footprint over a pixel's width.
+    /// Largest error in the worst direction: the larger singular value of a texel's footprint over
+    /// a pixel's width.
     pub max: f64,
 }
 
-/// How rows of texels are spread over t.
+/// How the rows of texels are spread over t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rows {
-    /// Evenly: the matrix says it all, any GPU can render the map.
+    /// Evenly. The matrix alone describes the map, and any GPU can render it.
     Even,
     /// By the logarithm of the warp's depth, the optimum of Wimmer et al. 2004, §4.2. No GPU
-    /// rasterises this; the CPU reference casts it.
+    /// rasterises such maps; the CPU reference traces them.
     Logarithmic {
-        /// Far over near distance of the warp frustum, (λ + μ)/λ, > 1.
+        /// Ratio of the warp frustum's far distance to its near distance, (λ + μ)/λ, > 1.
         ratio: f64,
     },
 }
 
 impl Rows {
-    /// The t at which the warped row coordinate `row` in [0, 1] lies.
+    /// The t of a row coordinate in [0, 1], which counts rows as a share of all rows.
     pub fn t_from_row(self, row: f64) -> f64 {
         match self {
             Self::Even => row,
@@ -159,7 +167,7 @@ impl Rows {
         }
     }
 
-    /// d row / d t.
+    /// Derivative of the row coordinate with respect to t.
     pub fn row_derivative(self, t: f64) -> f64 {
         match self {
             Self::Even => 1.0,
@@ -174,121 +182,137 @@ impl Rows {
 /// One shadow map of a [`Plan`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShadowMap {
-    /// World position of local space's origin, metres; the same for all maps of a plan, repeated here
-    /// so that a map is complete in itself.
+    /// World position of local space's origin, metres. It is the same for all maps of a plan, and
+    /// repeated here so that each map is complete.
     pub origin: DVec3,
-    /// Takes a homogeneous local point to (s, t, depth) after the divide. Receivers land in
-    /// [0, 1]³; casters between them and the light get depths below 0 and are clamped to 0. The
-    /// fourth coordinate is positive wherever the map applies.
+    /// The matrix that takes a homogeneous local point to (s, t, depth) after the division by the
+    /// fourth coordinate. Receivers land in [0, 1]³; casters between them and the light get depths
+    /// below 0, which are clamped to 0. The fourth coordinate is positive wherever the map applies.
     pub shadow_from_local: DMat4,
     /// Inverse of `shadow_from_local`.
     pub local_from_shadow: DMat4,
-    /// How rows of texels are spread over t; even for all warps but `log`.
+    /// How the rows of texels are spread over t; even for all warps but `log`.
     pub rows: Rows,
-    /// Texels in s and t. Both 0 if the map sees nothing ([`is_empty`](Self::is_empty)).
+    /// Number of texels in s and t; both 0 if the map [is empty](Self::is_empty).
     pub resolution: [u32; 2],
-    /// Which part of what the camera sees the map is for.
+    /// Which part of the view the map serves.
     pub part: Part,
-    /// The range along the view direction that the map is for, metres. For maps of the frustum's side
-    /// faces the range on the face.
+    /// The range of distances along the view that the map serves, metres. For maps of a side face
+    /// of the frustum it is the range along the face.
     pub split: [f64; 2],
-    /// The map serves what lies inside all of these half-spaces, in local space. Where there is a next
-    /// slice, the first of them ends this one.
+    /// The map serves the intersection of these half-spaces, given in local space. If there is a
+    /// next slice, the first half-space ends this one.
     pub cell: Vec<Plane>,
-    /// Where slices overlap, the half-space before the next slice: from its border to the first plane
-    /// of `cell` the map fades into the next one.
+    /// Where slices overlap, the half-space in front of the next slice. The map fades into the next
+    /// one from the border of this half-space to that of the first half-space of `cell`.
     pub fade_from: Option<Plane>,
-    /// Distance λ from the warp's centre of projection to its near plane, in light-space metres (for
-    /// spot lights: in units of the light's image plane at unit distance). `None`: no warp.
+    /// Distance λ from the warp's centre of projection to its near plane, in light-space metres
+    /// (under spot lights in units of the light's image plane at distance 1). `None` if there is no
+    /// warp.
     pub lambda: Option<f64>,
-    /// Largest errors over the receivers served.
+    /// Largest errors over the receivers that the map serves.
     pub error: MapError,
-    /// This map's share of [`Plan::storage_factor`].
+    /// This map's summand of [`Plan::storage_factor`].
     pub storage_factor: f64,
-    /// What can cast into this map lies inside all of these half-spaces, in local space.
+    /// Everything that can cast into this map meets the intersection of these half-spaces, given in
+    /// local space.
     pub caster_planes: Vec<Plane>,
-    /// Local position of a spot light, from which the map's beams come; `None`: beams are parallel.
+    /// Local position of a spot or point light, at which the map's beams begin; `None` if the beams
+    /// are parallel.
     pub apex: Option<DVec3>,
-    /// Where the receivers served lie along the beams: [`Distances`](Slab::Distances) under lamps, else [`Leaning`](Slab::Leaning).
+    /// The slab that holds the receivers which the map serves: [`Distances`](Slab::Distances) under
+    /// spot and point lights, otherwise [`Leaning`](Slab::Leaning).
     pub slab: Slab,
 }
 
-/// A range of depths that holds a map's receivers, as tight as it easily gets: many times smaller than the map's own where light falls at a slant. What filters
-/// store in place of depth counts from here ([`ShadowMap::slab_depth`]), so that they spend their digits and their terms where shadows fall.
+/// A range of depths that holds a map's receivers closely. Where light falls at a slant it is many
+/// times smaller than the map's own range of depths. Prefilters count depth within the slab
+/// ([`ShadowMap::slab_depth`]), so that the digits of their statistics and the terms of their
+/// series resolve the depths at which shadows fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Slab {
-    /// Under parallel light, what lies between two parallel planes over (s, t), which follow the ground.
+    /// Under parallel light: the space between two parallel planes, at which depth is a linear
+    /// function of (s, t) that follows the ground.
     Leaning {
-        /// Growth of depth at its near side per unit of s and t.
+        /// Growth of the near plane's depth per unit of s and of t.
         slope: DVec2,
-        /// Depth of its near side at s = t = 0.
+        /// Depth of the near plane at s = t = 0.
         begin: f64,
-        /// Depth from its near to its far side, > 0.
+        /// Difference in depth between the two planes, > 0.
         thickness: f64,
     },
-    /// Under a lamp, distances from it along an axis.
+    /// Under a spot or point light: a range of distances from the light along an axis.
     Distances {
-        /// Unit vector, local space.
+        /// Unit vector in local space.
         axis: DVec3,
-        /// Metres.
+        /// Smallest distance, metres.
         near: f64,
-        /// Metres, more than `near`.
+        /// Largest distance, metres, > `near`.
         far: f64,
     },
 }
 
-/// All of a map's depths.
+/// A slab that holds all of a map's depths.
 impl Default for Slab {
     fn default() -> Self {
         Self::Leaning { slope: DVec2::ZERO, begin: 0.0, thickness: 1.0 }
     }
 }
 
-/// The line of points that one (s, t) stands for, in world space, running away from the light.
+/// The beam of light that one (s, t) stands for, as a line in world space that runs away from the
+/// light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// World position where the receivers' depth range begins.
+    /// World position on the beam at depth 0, where the receivers' range of depths begins.
     pub origin: DVec3,
     /// Unit vector away from the light.
     pub direction: DVec3,
-    /// How far back from `origin` casters may lie, metres, ≥ 0; infinite for parallel light.
+    /// Distance from `origin` back to the light, metres, ≥ 0, over which casters may lie;
+    /// infinite for parallel light.
     pub reach_back: f64,
 }
 
-/// A surface point as a shadow map sees it: all that a shadow test needs.
+/// A surface point in the coordinates of one shadow map, with everything that a shadow test needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Receiver {
     /// Shadow coordinates (s, t) of the point, by the matrix alone (before [`Rows`]).
     pub st: DVec2,
     /// Depth of the point.
     pub depth: f64,
-    /// Slope of the surface's plane in shadow space, ∂depth/∂(s, t). Perspective maps take planes to
-    /// planes, so this holds on the whole plane. Infinite where the surface is edge-on to the light.
+    /// Slope of the surface's tangent plane in shadow space, ∂depth/∂(s, t). Since projective
+    /// maps take planes to planes, it is the same all over the plane. Infinite where the surface is
+    /// edge-on to the light.
     pub slope: DVec2,
-    /// The same of the plane across the beam through the point: not zero where a warp tilts depth.
+    /// The same slope for the plane through the point perpendicular to the beam. It is not zero
+    /// where a warp tilts depth.
     pub level_slope: DVec2,
-    /// What half a texel is worth in depth: half of the longest way across its
-    /// [footprint](crate::aliasing::Footprint), laid along the beam.
+    /// Half the width of a texel, measured as depth along the beam. The texel's width is the
+    /// [longest](crate::aliasing::Footprint::longest) one of its footprint.
     pub half_texel: f64,
     /// Growth of depth along the beam, 1/m.
     pub depth_per_metre: f64,
-    /// How texels lie across the light: squares of the texels to a metre in s and in t, and the product of the two
-    /// directions (0 where they are perpendicular). A disc of radius r metres has r² times this for its covariance, but for a factor.
+    /// Texels per metre on the plane perpendicular to the light, squared: |∇s|², |∇t|² and
+    /// ∇s·∇t of the texel coordinates, texels²/m² (the last is 0 where the two gradients are
+    /// perpendicular). A Gaussian of standard deviation σ metres has σ² times these values as
+    /// its variances and covariance in texels, a disc of radius r metres r²/4 times.
     pub texel_metric: [f64; 3],
-    /// The same of texels to a pixel of the viewer's picture, on the surface's plane: more where it is seen at a slant, up to 16 times.
+    /// The same for a pixel of the viewer's image in place of a metre, on the surface's tangent
+    /// plane, texels²/pixel². A surface seen at a slant has larger values, by a factor of up to
+    /// 16 in texels per pixel.
     pub pixel_metric: [f64; 3],
 }
 
-/// What is seen at a slant of less than this (the sine of it) counts as if at this one.
+/// Least sine of the angle between the line of sight and a surface. Surfaces seen at a smaller
+/// angle count as if seen at this one, or a pixel on them could be infinitely long.
 const LEAST_SLANT: f64 = 1.0 / 16.0;
 
-/// Squares of two gradients, and their product.
+/// The squares of two gradients' lengths, and their dot product.
 fn metric(s: DVec3, t: DVec3) -> [f64; 3] {
     [s.length_squared(), t.length_squared(), s.dot(t)]
 }
 
 impl ShadowMap {
-    /// Whether the map serves no receivers; then it has no texels and costs nothing.
+    /// Whether the map serves no receivers. An empty map has no texels.
     pub fn is_empty(&self) -> bool {
         self.resolution.contains(&0)
     }
@@ -303,20 +327,22 @@ impl ShadowMap {
         self.shadow_from_local.as_mat4()
     }
 
-    /// Takes a homogeneous world point to (s, t, depth) after the divide. Far from the world's
-    /// origin use [`shadow_from_local`](Self::shadow_from_local) instead.
+    /// The matrix that takes a homogeneous world point to (s, t, depth) after the division. Far
+    /// from the world's origin use [`shadow_from_local`](Self::shadow_from_local) instead, which
+    /// does not lose digits.
     pub fn shadow_from_world(&self) -> DMat4 {
         self.shadow_from_local * DMat4::from_translation(-self.origin)
     }
 
-    /// (s, t, depth) of a world point; `None` where the map does not apply (behind the warp's
-    /// centre of projection or a spot light).
+    /// Shadow coordinates (s, t, depth) of a world point; `None` where the map does not apply,
+    /// behind the warp's centre of projection or behind a spot light.
     pub fn project(&self, world_position: DVec3) -> Option<DVec3> {
         let h = self.shadow_from_local * (world_position - self.origin).extend(1.0);
         (h.w > 0.0).then(|| h.xyz() / h.w)
     }
 
-    /// Where a depth lies in the [slab](Self::slab) of the receivers: 0 at its near side and 1 at its far side; linear along the beam.
+    /// Position of a depth within the receivers' [slab](Self::slab): 0 at its near side, 1 at its
+    /// far side, and linear along the beam.
     pub fn slab_depth(&self, st: DVec2, depth: f64) -> f64 {
         match self.slab {
             Slab::Leaning { slope, begin, thickness } => {
@@ -325,35 +351,38 @@ impl ShadowMap {
             Slab::Distances { axis, near, far } => {
                 let h = self.local_from_shadow * st.extend(depth).extend(1.0);
                 let apex = self.apex.unwrap_or(DVec3::ZERO);
-                // What is beyond infinity is behind everything.
+                // Depths beyond the image of infinity lie behind all receivers.
                 if h.w > 0.0 { (axis.dot(h.xyz() / h.w - apex) - near) / (far - near) } else { 1.0 }
             }
         }
     }
 
-    /// How wide the penumbra is of what lies at `depth` on the beam through `st`, for a light of diameter 1: metres across the receiver's beam, for the sun per
-    /// metre of distance from it (Fernando 2005).
+    /// Width of the penumbra that an occluder at `depth` on the beam through `st` casts onto the
+    /// receiver, for a light of [diameter](crate::visibility::LightSize::diameter) 1 (Fernando
+    /// 2005): metres across the receiver's beam, per metre of a lamp's diameter or per unit of the
+    /// sun's.
     pub(crate) fn penumbra(&self, receiver: &Receiver, st: DVec2, depth: f64) -> f64 {
         let [[here, step], [there, _]] = [receiver.st, st].map(|st| self.beam_scale(st));
         let level = receiver.depth + receiver.level_slope.dot(st - receiver.st);
         if step == 0.0 {
             return ((level - depth) / (receiver.depth_per_metre * there / here)).max(0.0);
         }
-        // Distances from a lamp go with one over the fourth coordinate.
+        // Distance from a lamp is inversely proportional to the fourth coordinate.
         let [at, level] = [depth, level].map(|d| there + step * d);
         if level > 0.0 { (at / level - 1.0).clamp(0.0, 1e6) } else { 0.0 }
     }
 
-    /// The fourth coordinate of the points of a beam: where depth is 0, and its growth to where depth is 1.
+    /// The fourth coordinate along a beam, from shadow space to local space: its value at depth 0,
+    /// and its change from there to depth 1.
     pub(crate) fn beam_scale(&self, st: DVec2) -> [f64; 2] {
         let w = self.local_from_shadow.row(3);
         [w.x * st.x + w.y * st.y + w.w, w.z]
     }
 
-    /// The beam through (s, t). Slightly outside [0, 1]² is fine; `None` where no point has these
-    /// coordinates (beyond the warp's horizon).
+    /// The beam through (s, t), which may lie slightly outside [0, 1]². `None` where no point has
+    /// these coordinates, beyond the warp's horizon.
     pub fn beam(&self, st: DVec2) -> Option<Beam> {
-        // Depth 0 exists on every beam; a spot light's may reach infinity before depth 1.
+        // Every beam has a point of depth 0; a spot light's beam may reach infinity before depth 1.
         let h = self.local_from_shadow * st.extend(0.0).extend(1.0);
         let near = (h.w > 0.0).then(|| h.xyz() / h.w)?;
         let direction = self.beam_direction(near)?;
@@ -361,7 +390,8 @@ impl ShadowMap {
         Some(Beam { origin: near + self.origin, direction, reach_back })
     }
 
-    /// See [`Plan::receiver`], and [`Plan::pixel_gradient`].
+    /// The receiver of [`Plan::receiver`], with the plan's
+    /// [`pixel_gradient`](Plan::pixel_gradient).
     fn receiver(
         &self,
         world_position: DVec3,
@@ -371,7 +401,8 @@ impl ShadowMap {
         let local = world_position - self.origin;
         let here = (!self.is_empty()).then(|| Local::at(self, local))??;
         let world_normal = world_normal.try_normalize()?;
-        // In shadow space a plane's covector is the world's times the inverse matrix.
+        // Covectors of planes transform from local to shadow space by the transposed inverse
+        // matrix.
         let slope = |normal: DVec3| {
             let plane = normal.extend(-normal.dot(local));
             let shadow_plane = self.local_from_shadow.transpose() * plane;
@@ -387,7 +418,8 @@ impl ShadowMap {
             half_texel: 0.5 * here.footprint().longest() * here.depth_per_metre,
             texel_metric: metric(here.grad_s, here.grad_t),
             pixel_metric: {
-                // Along the surface's plane a step across the view goes on along it.
+                // A step across the line of sight is continued along that line until it meets the
+                // surface's tangent plane.
                 let view = local.normalize_or_zero();
                 let slant = world_normal.dot(view);
                 let slant = slant.signum() * slant.abs().max(LEAST_SLANT);
@@ -403,15 +435,16 @@ impl ShadowMap {
         })
     }
 
-    /// Whether anything in `aabb` (world space) can cast a shadow into this map. Never `false` for
-    /// one that does; `true` for some that do not.
+    /// Whether anything in `aabb` (world space) can cast a shadow into this map. The test is
+    /// conservative: it is never `false` for a box that holds a caster, and sometimes `true` for
+    /// one that holds none.
     pub fn may_cast(&self, aabb: Aabb) -> bool {
         let local = aabb.relative_to(self.origin);
         !self.is_empty() && self.caster_planes.iter().all(|p| p.may_touch(local))
     }
 
-    /// How far the map answers for a point, 0 ..= 1: 0 outside what it serves, 1 inside, falling
-    /// where it fades into the next slice's map.
+    /// How much the map contributes at a world point, 0 ..= 1: 0 outside what the map serves, 1
+    /// inside, and in between where the map fades into that of the next slice.
     pub fn weight(&self, world_position: DVec3) -> f64 {
         let local = world_position - self.origin;
         if self.is_empty() || self.cell.iter().any(|p| p.distance(local) < 0.0) {

@@ -2,7 +2,7 @@ use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::error::Error;
 use crate::focus::Body;
-use crate::light::{Lamp, Light};
+use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
 use crate::resolution::resolutions;
@@ -10,29 +10,43 @@ use crate::technique::{Faces, Limits, Technique};
 use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
 use draft::{Draft, Drafting};
-use finish::{Finish, Finishing};
+use finish::{FinishRequest, Finishing};
 use slices::Slicing;
 
 mod draft;
 mod finish;
 mod slices;
 
-/// Plans shadow maps. Keep one per view: its buffers are reused, so that planning allocates nothing
-/// once they have grown.
+/// Plans shadow maps. Keep one planner for each view: it reuses its buffers, so that planning
+/// allocates no memory once they have grown.
 ///
-/// Two lights share 2048² texels over four slices each; which maps answer for a point, whether a box may
-/// cast into one, and where they lie in an atlas:
+/// In this example two lights share 2048² texels over four slices each. The plan tells which map
+/// serves a point and whether a box may cast into that map, and an atlas tells where the maps lie:
 ///
 /// ```
 /// # use umbrage::*;
 /// # use glam::dvec3;
-/// # let camera = Camera::look_at(LookAt { eye: dvec3(0.0, 2.0, 0.0), target: dvec3(0.0, 1.0, -9.0), up: dvec3(0.0, 1.0, 0.0),
-/// #     fov_y_rad: 1.0, near: 0.1, far: 200.0, image: [1280, 720] })?;
-/// # let torch = SpotLight { position: dvec3(4.0, 5.0, -9.0), direction: dvec3(-0.5, -1.0, -0.3), half_angle_rad: 0.6, near: 0.1, range: 30.0 };
+/// # let camera = Camera::look_at(LookAt {
+/// #     eye: dvec3(0.0, 2.0, 0.0),
+/// #     target: dvec3(0.0, 1.0, -9.0),
+/// #     up: dvec3(0.0, 1.0, 0.0),
+/// #     fov_y_rad: 1.0,
+/// #     near: 0.1,
+/// #     far: 200.0,
+/// #     image: [1280, 720],
+/// # })?;
+/// # let torch = SpotLight {
+/// #     position: dvec3(4.0, 5.0, -9.0),
+/// #     direction: dvec3(-0.5, -1.0, -0.3),
+/// #     half_angle_rad: 0.6,
+/// #     near: 0.1,
+/// #     range: 30.0,
+/// # };
 /// let lights = [Light::Directional { direction: dvec3(0.3, -1.0, 0.2) }, Light::Spot(torch)];
 /// let bounds = Bounds::of_scene(Aabb::new(dvec3(-50.0, 0.0, -90.0), dvec3(50.0, 9.0, 10.0)));
 /// let partition = Partition { splits: Splits::Fitted, overlap: 0.1, ..Partition::slices(4) };
-/// let technique = Technique { partition, size: Size::Budget(2048 * 2048), ..Technique::default() };
+/// let size = Size::Budget(2048 * 2048);
+/// let technique = Technique { partition, size, ..Technique::default() };
 /// let mut planner = Planner::new();
 /// let plan = planner.plan(&camera, &lights, &bounds, &technique)?;
 /// let (map, share) = plan.lookup(0, dvec3(1.0, 0.0, -9.0)).next().expect("a map of the sun's");
@@ -47,63 +61,64 @@ pub struct Planner {
     limits: Limits,
     plan: Plan,
     drafts: Vec<Draft>,
-    /// Largest errors of each map at one texel, pixels per texel; 0 if it has nothing to serve.
+    /// Each map's largest errors in s and t if it had one texel, pixels per texel; 0 for maps
+    /// without receivers.
     units: Vec<[f64; 2]>,
     sizes: Vec<[u32; 2]>,
     bodies: Bodies,
-    /// Planes around all that the camera sees.
+    /// Planes around everything that the camera sees.
     around: Vec<Plane>,
-    /// Planes around the part of a light's view that a face is for.
+    /// Planes around the part of a light's view that a face of the frustum serves.
     cell: Vec<Plane>,
     slicing: Slicing,
     drafting: Drafting,
     finishing: Finishing,
 }
 
-/// What is seen, cut smaller step by step.
+/// Bodies of receivers, each cut out of the one before.
 #[derive(Clone, Debug, Default)]
 struct Bodies {
-    /// By the camera, of the receivers.
+    /// The receivers that the camera sees.
     view: Body,
-    /// In a light.
+    /// Those within one projector's light.
     lit: Body,
-    /// In the part of a face.
+    /// Those that a face of the frustum serves.
     face: Body,
-    /// One box of receivers, before the others.
+    /// One box of receivers, before it joins the others.
     part: Body,
 }
 
-/// Checked input.
+/// Checked input for the maps of one projector.
 struct Request<'a> {
     camera: &'a Camera,
-    lamp: &'a Lamp,
+    projector: &'a Projector,
     bounds: &'a Bounds<'a>,
     technique: &'a Technique,
 }
 
 impl Planner {
-    /// A planner with empty buffers, for any WebGPU device: its [`Limits`] are the default ones.
+    /// A planner with empty buffers and default [`Limits`], which every WebGPU device supports.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A planner with empty buffers, for a device of these limits.
+    /// A planner with empty buffers for a device with these limits.
     pub fn with_limits(limits: Limits) -> Self {
         Self { limits, ..Self::default() }
     }
 
-    /// What the device can hold.
+    /// The texture sizes that the device allows.
     pub fn limits(&self) -> Limits {
         self.limits
     }
 
-    /// Plans the shadow maps of all `lights` for one view. A budget of texels is shared among them.
+    /// Plans the shadow maps of all `lights` for one view. The lights share a budget of texels.
     ///
-    /// A camera that sees none of the receivers, or none in a light, gets empty maps.
+    /// Where the camera sees no receivers, or none within a light, the maps are empty.
     ///
     /// # Errors
     /// Names the first field of technique, limits, lights or bounds that is out of its range. The
-    /// planner can still be used.
+    /// planner can be used again after an error.
     pub fn plan(
         &mut self,
         camera: &Camera,
@@ -124,9 +139,12 @@ impl Planner {
             let light = light.checked()?;
             check_light_size(technique, &light)?;
             let first = self.units.len();
-            for (side, lamp) in light.lamps() {
+            for (side, projector) in light.projectors() {
                 let part = Part { light: index, side, ..Part::default() };
-                self.draft_lamp(part, &Request { camera, lamp: &lamp, bounds, technique });
+                self.draft_projector(
+                    part,
+                    &Request { camera, projector: &projector, bounds, technique },
+                );
             }
             let theta_rad = self.theta(&light, camera);
             self.plan.lights.push(PlannedLight { maps: first..self.units.len(), theta_rad });
@@ -134,15 +152,16 @@ impl Planner {
         let Self { limits, plan, drafts, units, sizes, finishing, .. } = self;
         plan.maps.truncate(units.len());
         resolutions(technique, *limits, units, sizes)?;
-        let finish = Finish { camera, bounds, technique, limits: *limits };
+        let request = FinishRequest { camera, bounds, technique, limits: *limits };
         for ((map, draft), &size) in plan.maps.iter_mut().zip(drafts).zip(&*sizes) {
-            finishing.finish(map, draft, size, &finish)?;
+            finishing.finish(map, draft, size, &request)?;
         }
         Ok(plan)
     }
 
-    /// Finds what the camera sees of the receivers.
+    /// Finds the body of the receivers that the camera sees.
     fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
+        // `lit` is not in use yet; it holds the whole view while `view` is put together from boxes.
         let Bodies { view, lit: whole, part, .. } = &mut self.bodies;
         let local = |aabb: Aabb| aabb.relative_to(camera.eye());
         view.set_frustum(camera);
@@ -157,7 +176,8 @@ impl Planner {
             view.clear();
             let seen = Aabb::around(whole.vertices().iter().copied());
             for &aabb in bounds.receiver_parts {
-                // What is cut out of a vast box would have lost the digits that the box takes.
+                // Vertices cut out of a vast box would lose as many digits as the box's size takes
+                // up, so the box is first intersected with what is seen.
                 let aabb = local(aabb).intersection(seen);
                 let sides = whole.sides(aabb);
                 let may_be_seen = |p: &Plane| p.may_touch(aabb);
@@ -170,15 +190,15 @@ impl Planner {
         }
     }
 
-    /// Appends the maps of one lamp, all but their resolutions and what follows from them.
-    fn draft_lamp(&mut self, part: Part, request: &Request<'_>) {
-        let Request { camera, lamp, technique, .. } = *request;
+    /// Appends the maps of one projector, without their resolutions and what depends on these.
+    fn draft_projector(&mut self, part: Part, request: &Request<'_>) {
+        let Request { camera, projector, technique, .. } = *request;
         let Bodies { view, lit, .. } = &mut self.bodies;
-        let pyramid = lamp.frustum(camera.eye(), view.size());
+        let pyramid = projector.frustum(camera.eye(), view.size());
         lit.copy_from(view);
         pyramid.into_iter().flatten().for_each(|plane| lit.clip(plane));
         let with_near = technique.partition.faces == Faces::SidesAndNear;
-        let faces = partition::Faces::new(camera, lamp, with_near);
+        let faces = partition::LitFaces::new(camera, projector, with_near);
         for &face in technique.partition.face_list() {
             self.cell.clear();
             let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
@@ -194,7 +214,8 @@ impl Planner {
         }
     }
 
-    /// Angle between the view and a light's way at the middle of what is seen in it.
+    /// Angle between the view and the light direction, at the middle of what the camera sees in the
+    /// light.
     fn theta(&self, light: &Light, camera: &Camera) -> f64 {
         let Bodies { view, lit, .. } = &self.bodies;
         let seen = if matches!(light, Light::Point(_)) { view } else { lit };
@@ -202,7 +223,8 @@ impl Planner {
     }
 }
 
-/// That the filter's light, if it asks how large it is, is of the kind that shines.
+/// Checks that a size of the light which the filter needs is given in the unit of this kind of
+/// light.
 fn check_light_size(technique: &Technique, light: &Light) -> Result<(), Error> {
     let Filter::Pcss { light: size, .. } = technique.filter else { return Ok(()) };
     let problem = match (light, size) {

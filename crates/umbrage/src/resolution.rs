@@ -1,22 +1,24 @@
-//! How many texels each map gets.
+//! How many texels each map has.
 
 use crate::error::{Error, check};
 use crate::technique::{Limits, Size, Technique};
 
-/// Ratios of a map's sides beyond this are cut.
+/// The largest ratio of a map's sides.
 const MAX_RATIO: f64 = 1e9;
 
-/// Texels in s and t for maps whose largest errors at one texel are `units` (pixels per texel), each
-/// pushed to `sizes` in turn. Maps with units of zero get none.
+/// Computes the resolutions, texels in s and t, of maps whose largest errors with one texel are
+/// `units` (pixels per texel), and pushes them to `sizes` in turn. Maps whose units are zero get no
+/// texels.
 ///
-/// With a budget all maps get the same largest error in s and in t: S texels over maps that need
-/// uᵢ = M_s M_t each for an error of one are divided as S uᵢ/Σu, and within a map as
-/// res_s : res_t = M_s : M_t (Lloyd et al. 2006, Eqs. 13, 14). A side that the device cannot have is cut,
-/// and what it leaves over goes to the other side and to the other maps.
+/// With a budget all maps get the same largest error in s and in t. For an error of one, map i
+/// needs uᵢ = M_s M_t texels. A budget of S texels is divided among the maps as S uᵢ/Σu, and
+/// within a map as res_s : res_t = M_s : M_t (Lloyd et al. 2006, Eqs. 13, 14). A side longer or
+/// shorter than the device allows is clamped, and the texels thereby saved go to the map's other
+/// side and to the other maps.
 ///
 /// # Errors
-/// A budget of less than the smallest possible size for each map; an error that needs sides longer than
-/// the device has.
+/// If a budget is less than the smallest possible size of all maps, or if an error requires sides
+/// longer than the device allows.
 pub(crate) fn resolutions(
     technique: &Technique,
     limits: Limits,
@@ -59,7 +61,8 @@ fn is_empty(unit: &[f64; 2]) -> bool {
     unit.contains(&0.0)
 }
 
-/// `size` scaled up by `factor` each way, within what the device allows.
+/// `size` with both sides multiplied by `factor` and rounded up, or an error if the device does not
+/// allow it.
 pub(crate) fn enlarged(
     technique: &Technique,
     limits: Limits,
@@ -69,11 +72,11 @@ pub(crate) fn enlarged(
     Sides::new(technique, limits).at_least(size.map(|n| f64::from(n) * factor), 1.0)
 }
 
-/// What sides a map may have, texels.
+/// The lengths that a map's sides may have, texels.
 struct Sides {
     /// Sides are multiples of this.
     align: f64,
-    /// Of a side's texels, those that only leave room to move by whole texels.
+    /// The number of texels of a side that are reserved for moving the map by whole texels.
     spare: f64,
     least: f64,
     most: f64,
@@ -91,7 +94,7 @@ impl Sides {
         }
     }
 
-    /// Sides, not yet whole, at which a map's errors are `error`; cut to the limits.
+    /// The sides with which a map's errors are `error`, not rounded but clamped to the limits.
     fn sides(&self, [s, t]: [f64; 2], error: f64) -> [f64; 2] {
         [s, t].map(|unit| (unit / error).clamp(self.least, self.most))
     }
@@ -100,11 +103,13 @@ impl Sides {
         ((side / self.align).floor() * self.align).clamp(self.least, self.most)
     }
 
-    /// The best whole sides for no more than `texels`, which suffice for the least sides.
+    /// The best whole sides with at most `texels` texels, of which there are enough for the least
+    /// sides.
     fn within(&self, texels: f64, [unit_s, unit_t]: [f64; 2]) -> [u32; 2] {
         let ratio = (unit_s / unit_t).clamp(1.0 / MAX_RATIO, MAX_RATIO);
         let wanted = (texels * ratio).sqrt().min(texels / self.least);
-        // Rounding s first and giving t what is left keeps within the budget and wastes the least.
+        // Rounding s first and then giving t the remaining texels keeps to the budget and wastes
+        // the fewest texels.
         let nearest = self.aligned(wanted + self.align / 2.0);
         let s = if nearest * self.least <= texels { nearest } else { self.aligned(wanted) };
         let t = self.aligned(texels / s);
@@ -113,7 +118,7 @@ impl Sides {
         [s as u32, t as u32]
     }
 
-    /// The least whole sides with errors of no more than `error`.
+    /// The least whole sides with errors of at most `error`.
     fn at_least(&self, unit: [f64; 2], error: f64) -> Result<[u32; 2], Error> {
         let sides = unit.map(|u| {
             let side = u / error + self.spare;
@@ -129,7 +134,7 @@ impl Sides {
     }
 }
 
-/// The error that all maps have when `texels` are spread over them.
+/// The error that all maps share when `texels` texels are divided among them.
 fn common_error(limits: &Sides, units: &[[f64; 2]], texels: f64) -> f64 {
     let used = || units.iter().filter(|u| !is_empty(u));
     let total =
@@ -141,7 +146,7 @@ fn common_error(limits: &Sides, units: &[[f64; 2]], texels: f64) -> f64 {
     if cuts_nothing || used().next().is_none() {
         return unlimited;
     }
-    // Texels fall as the error grows. Bracket, then halve.
+    // The number of texels decreases with the error: bracket the solution, then bisect.
     let (mut lo, mut hi) = (unlimited, unlimited);
     while !fits(hi) && hi < unlimited * 1e30 {
         hi *= 4.0;

@@ -1,4 +1,4 @@
-//! The slab that receivers lie in.
+//! The slab of depths that holds a map's receivers.
 
 use crate::focus::Body;
 use crate::math::range;
@@ -6,37 +6,41 @@ use crate::plan::{ShadowMap, Slab};
 use crate::warp::LightSpace;
 use glam::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
 
-/// How many texels' widths, laid along the beam, lie between the slab's near side and the receivers: casters before it are taken to lie on it, and a receiver
-/// is to tell them from itself.
+/// Distance between the slab's near side and the receivers, in texel widths measured as depth along
+/// the beam. Casters in front of the slab are clamped to its near side, and a receiver must still
+/// be distinguished from them.
 const MARGIN_TEXELS: f64 = 4.0;
 
-/// The same as a share of the slab.
+/// The least distance between the slab's near side and the receivers, as a share of the receivers'
+/// thickness.
 const MARGIN_SHARE: f64 = 0.1;
 
-/// Thinner ones have too few of a depth buffer's digits.
+/// The least thickness of a slab. Within a thinner one a depth buffer would resolve too few depths.
 const LEAST_THICKNESS: f64 = 1.0 / 4096.0;
 
-/// The slab is at most so much thicker than the thinnest one.
+/// The share by which the slab found may be thicker than the thinnest one.
 const TOLERANCE: f64 = 0.02;
 
-/// Steeper slabs are not looked for.
+/// The largest distance of slopes from that of the least-squares plane that are searched.
 const STEEPEST: f64 = 4.0;
 
-/// Around corners of what a map serves, (s, t, depth), under parallel light, where planes are planes over (s, t) as well. `texel_depth`: the largest width of a
-/// texel there, laid along the beam, in depth.
+/// The slab under parallel light around the corners (s, t, depth) of the receivers that a map
+/// serves. Under parallel light planes are planes over (s, t), too. `texel_depth` is the largest
+/// width of a texel there, measured as depth along the beam.
 pub(crate) fn slab(corners: &[DVec3], texel_depth: f64) -> Slab {
     let slope = thinnest(corners);
     let (near, far) = range(corners.iter().map(|p| p.z - slope.dot(p.truncate())));
     let thickness = far - near;
     let margin = (MARGIN_TEXELS * texel_depth).max(MARGIN_SHARE * thickness).max(LEAST_THICKNESS);
-    // Behind, nothing but rounding is to be allowed for.
+    // On its far side the slab need only allow for rounding.
     let whole = margin + thickness + 1e-3 * (margin + thickness);
     let slab = Slab::Leaning { slope, begin: near - margin, thickness: whole };
     let is_sound = slope.is_finite() && near.is_finite() && whole.is_finite();
     if is_sound { slab } else { Slab::default() }
 }
 
-/// Under a lamp: distances along its axis, before they are told ([`distances`], [`all_distances`]).
+/// The slab of a map under a lamp before its distances are known; they are set by [`distances`] or
+/// [`all_distances`].
 pub(crate) fn along_axis(space: &LightSpace) -> Slab {
     match space.apex {
         None => Slab::default(),
@@ -47,18 +51,20 @@ pub(crate) fn along_axis(space: &LightSpace) -> Slab {
     }
 }
 
-/// Around what a map serves under a lamp at `apex`. `texel`: the largest width of a texel there, metres.
+/// The slab around the receivers that a map serves under a lamp at `apex`. `texel` is the largest
+/// width of a texel there, metres.
 pub(crate) fn distances(map: &ShadowMap, apex: DVec3, body: &Body, texel: f64) -> Slab {
     let Slab::Distances { axis, .. } = map.slab else { return map.slab };
     let (near, far) = range(body.vertices().iter().map(|v| axis.dot(*v - apex)));
     let margin = (MARGIN_TEXELS * texel).max(MARGIN_SHARE * (far - near)).max(1e-3 * far);
-    // Some way before the lamp itself, and a little behind everything.
+    // The slab keeps in front of the lamp, and ends a little behind all receivers.
     let slab = Slab::Distances { axis, near: (near - margin).max(0.0), far: far + 1e-3 * far };
     let is_sound = near.is_finite() && far > 0.0 && far.is_finite() && margin.is_finite();
     if is_sound { slab } else { all_distances(map, apex) }
 }
 
-/// All of the depths of a map under a lamp, as they are on the beam in its middle; a thousand times as far as they begin where they have no end.
+/// The slab of all depths of a map under a lamp, taken from the beam through the map's middle.
+/// Where depths reach infinity, the slab ends at a thousand times the distance of its near side.
 pub(crate) fn all_distances(map: &ShadowMap, apex: DVec3) -> Slab {
     let Slab::Distances { axis, .. } = map.slab else { return map.slab };
     let at = |depth: f64| {
@@ -72,8 +78,9 @@ pub(crate) fn all_distances(map: &ShadowMap, apex: DVec3) -> Slab {
     Slab::Distances { axis, near, far }
 }
 
-/// The growth per s and t of the planes between which points (s, t, depth) lie closest together: the ellipsoid method in two dimensions, which converges on
-/// any convex function from its subgradients alone.
+/// The slope, depth per s and t, of the thinnest slab around points (s, t, depth). It is found by
+/// the ellipsoid method in two dimensions, which converges for any convex function from its
+/// subgradients alone.
 fn thinnest(points: &[DVec3]) -> DVec2 {
     let (mut slope, reach) = least_squares(points);
     let mut ellipse = DMat2::from_diagonal(DVec2::splat(reach * reach));
@@ -86,9 +93,9 @@ fn thinnest(points: &[DVec3]) -> DVec2 {
         }
         let gradient = near.1 - far.1;
         let along = ellipse * gradient;
-        // By so much the thinnest one may be thinner.
+        // The thinnest slab is thinner than the current one by at most this.
         let gap = gradient.dot(along).max(0.0).sqrt();
-        // NaN ends it as well.
+        // The search also ends if the gap is NaN.
         let goes_on = gap > TOLERANCE * best.0 && gap > 0.1 * LEAST_THICKNESS;
         if !goes_on {
             break;
@@ -101,7 +108,8 @@ fn thinnest(points: &[DVec3]) -> DVec2 {
     best.1
 }
 
-/// Of the points' depths over a sloping plane the least and the greatest, and where they are.
+/// The least and the greatest depth of the points relative to a sloping plane, each with the (s, t)
+/// of its point.
 fn extremes(points: &[DVec3], slope: DVec2) -> [(f64, DVec2); 2] {
     let mut near = (f64::INFINITY, DVec2::ZERO);
     let mut far = (f64::NEG_INFINITY, DVec2::ZERO);
@@ -118,7 +126,8 @@ fn extremes(points: &[DVec3], slope: DVec2) -> [(f64, DVec2); 2] {
     [near, far]
 }
 
-/// The slope of the plane nearest to the points in the mean of squares, and how far from it that of the thinnest slab can be.
+/// The slope of the least-squares plane through the points, and a bound on its distance from the
+/// slope of the thinnest slab.
 fn least_squares(points: &[DVec3]) -> (DVec2, f64) {
     let n = points.len().max(1) as f64;
     let mean = points.iter().sum::<DVec3>() / n;
@@ -139,7 +148,9 @@ fn least_squares(points: &[DVec3]) -> (DVec2, f64) {
     }
     let slope = covariance.inverse() * with_depth;
     let [near, far] = extremes(points, slope);
-    // Tilted by so much, a slab is thicker by the points' width in that direction, which is two deviations at least, than twice what it was.
+    // Let T be the thickness of the slab around this plane and σ the least standard deviation of
+    // the points' (s, t). Along any direction the points extend over 2σ at least. So a slab whose
+    // slope differs by more than T/σ is thicker than 2T − T = T, and not the thinnest.
     (slope, ((far.0 - near.0) / least.sqrt()).min(STEEPEST))
 }
 
@@ -168,7 +179,8 @@ mod tests {
                 far - near
             };
             let found = thickness(thinnest(&points));
-            // Halving steps in all directions, down to where nothing gets better.
+            // An independent search by steps in all directions, which are halved until nothing
+            // improves.
             let (mut slope, mut step) = (lean, 0.5);
             while step > 1e-5 {
                 let around =
@@ -188,7 +200,7 @@ mod tests {
         for points in [vec![], vec![DVec3::ONE], vec![DVec3::ZERO, DVec3::ONE, DVec3::splat(0.5)]] {
             let slope = thinnest(&points);
             let (near, far) = range(points.iter().map(|p| p.z - slope.dot(p.truncate())));
-            // Without any points the range is empty.
+            // Without points the range is empty.
             let is_thin = points.is_empty() || far - near <= 0.01;
             assert!(slope.is_finite() && is_thin, "{points:?}: {slope}");
         }

@@ -1,70 +1,75 @@
-//! Stable maps: their texels keep their places in the world.
+//! Stable maps, whose texels keep their positions in the world.
 
 use crate::camera::Camera;
-use crate::light::Lamp;
+use crate::light::Projector;
 use crate::matrices::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::plan::ShadowMap;
 use crate::slab::along_axis;
 use crate::warp::LightSpace;
 use glam::{DMat3, DVec3, DVec4};
 
-/// Where a stable map lies: its texels keep their places and their size, whatever the camera does.
+/// The placement of a stable map. Its texels keep their positions and their size in the world,
+/// whatever the camera does.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stable {
     space: LightSpace,
-    covers: Covers,
+    region: Region,
     unit_error: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Covers {
-    /// A sphere, on a grid of texels that is fixed in the world. Middle in world space, metres.
+enum Region {
+    /// A sphere, covered by a grid of texels that is fixed in the world. The centre is in world
+    /// space, metres.
     Sphere { center: DVec3, radius: f64 },
-    /// All that a lamp shines on, from 1/far to 1/near in 1/metres.
+    /// All that a pyramid of light reaches, from 1/far to 1/near in 1/metres.
     Pyramid { slope: f64, inverse_depths: [f64; 2] },
 }
 
 impl Stable {
-    /// Around the part of the view frustum from `near` to `far`; under a lamp around all it shines on.
-    pub(crate) fn around(lamp: &Lamp, camera: &Camera, [near, far]: [f64; 2]) -> Self {
-        let space = LightSpace::fixed(lamp, camera);
+    /// Covers the bounding sphere of the part of the view frustum from `near` to `far`, or, in a
+    /// pyramid of light, all that the light reaches.
+    pub(crate) fn around(projector: &Projector, camera: &Camera, [near, far]: [f64; 2]) -> Self {
+        let space = LightSpace::fixed(projector, camera);
         let pixel = camera.pixel_width_per_depth();
-        if let Lamp::Pyramid { slope, near, range, .. } = *lamp {
-            let covers = Covers::Pyramid { slope, inverse_depths: [range, near].map(f64::recip) };
-            // As if what it shines on were seen from as far away as the lamp is.
-            return Self { space, covers, unit_error: 2.0 * slope / pixel };
+        if let Projector::Pyramid { slope, near, range, .. } = *projector {
+            let region = Region::Pyramid { slope, inverse_depths: [range, near].map(f64::recip) };
+            // The error of a receiver that the camera sees from the same distance as the lamp.
+            return Self { space, region, unit_error: 2.0 * slope / pixel };
         }
         let (center, radius) = bounding_sphere(camera, [near, far]);
-        let covers = Covers::Sphere { center: camera.eye() + center, radius };
-        Self { space, covers, unit_error: 2.0 * radius / (near * pixel) }
+        let region = Region::Sphere { center: camera.eye() + center, radius };
+        Self { space, region, unit_error: 2.0 * radius / (near * pixel) }
     }
 
-    /// The map's largest errors in s and t at one texel, pixels per texel, whatever receivers there are: the
-    /// same in every frame.
+    /// The map's largest errors in s and t with one texel, pixels per texel, whatever receivers
+    /// there are. They are the same in every frame.
     pub(crate) fn unit_errors(&self) -> [f64; 2] {
         [self.unit_error; 2]
     }
 
-    /// Sets a map's matrices, for the resolution it has. Gives how far before depth 0 the map has to
-    /// begin, as a share of its range of depths.
+    /// Sets a map's matrices for the resolution that it has. Returns the distance by which the map
+    /// has to begin before depth 0, as a share of its range of depths.
     pub(crate) fn place(&self, map: &mut ShadowMap) -> f64 {
-        let (middle, width, depth) = match self.covers {
-            Covers::Pyramid { slope, inverse_depths: [far, near] } => {
+        let (middle, width, depth) = match self.region {
+            Region::Pyramid { slope, inverse_depths: [far, near] } => {
                 let depth = DepthRange::around(far.midpoint(near), (near - far) / 2.0);
                 ([0.0; 2], [2.0 * slope; 2], depth)
             }
-            Covers::Sphere { center, radius } => {
-                // A texel more than the sphere takes leaves room to move by up to half a texel each way.
+            Region::Sphere { center, radius } => {
+                // The map is one texel wider than the sphere, and so can move by up to half a texel
+                // each way.
                 let texel = map.resolution.map(|n| 2.0 * radius / f64::from(n - 1));
                 let width = [0, 1].map(|i| texel[i] * f64::from(map.resolution[i]));
-                // The origin of the grid is the world's. What is measured from the eye is small: no digits
-                // are lost far from the world's origin but those that world positions have lost.
+                // The grid's origin is the world's origin, but positions are relative to the eye
+                // and small, so that far from the world's origin no digits are lost beyond those
+                // that world positions have lost.
                 let snapped = |axis: DVec4, step: f64| {
                     let axis = axis.truncate();
                     (axis.dot(center) / step).round() * step - axis.dot(map.origin)
                 };
                 let middle = [snapped(self.space.x, texel[0]), snapped(self.space.z, texel[1])];
-                // Depth moves in steps as well, so that what is stored does not change in between.
+                // Depth moves in steps, too, so that stored depths stay the same between steps.
                 let margin = (1.0 + MARGIN_TEXELS) * texel[0].max(texel[1]);
                 let depth = DepthRange::around(snapped(self.space.y, texel[0]), radius + margin);
                 (middle, width, depth)
@@ -76,11 +81,12 @@ impl Stable {
         [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &self.space);
         map.apex = self.space.apex;
         map.slab = along_axis(&self.space);
-        match self.covers {
-            // A sphere's depths have their margin already.
-            Covers::Sphere { .. } => 0.0,
-            Covers::Pyramid { slope, inverse_depths: [far, near] } => {
-                // A texel there is 2 slope/res of the way to the lamp wide, and 1/depth grows by as much.
+        match self.region {
+            // The sphere's range of depths already includes the margin.
+            Region::Sphere { .. } => 0.0,
+            Region::Pyramid { slope, inverse_depths: [far, near] } => {
+                // At the near end a texel's width is 2 slope/res times the distance from the lamp,
+                // and 1/distance changes by the same share along that width.
                 let shortest = map.resolution[0].min(map.resolution[1]);
                 let texel = 2.0 * slope / f64::from(shortest) * near;
                 MARGIN_TEXELS * texel / (near - far)
@@ -89,12 +95,13 @@ impl Stable {
     }
 }
 
-/// The sphere around the part of the view frustum from `near` to `far`: middle (local space) and radius,
-/// metres. Found among the view's own axes: wherever the camera is and however it is turned, the radius
-/// is the same to the last digit.
+/// The bounding sphere of the part of the view frustum from `near` to `far`: centre (local space)
+/// and radius, metres. It is computed in the view's own axes, so that the radius is the same to the
+/// last digit wherever the camera is and however it is turned.
 pub(crate) fn bounding_sphere(camera: &Camera, [near, far]: [f64; 2]) -> (DVec3, f64) {
     let corners = camera.corner_slopes().map(|slope| slope.extend(1.0));
-    // On the axis of the frustum, where near and far corners are equally far, or at the far plane.
+    // The centre lies on the frustum's axis, where near and far corners are equally distant, or at
+    // the far plane if that is nearer.
     let axis = corners.iter().sum::<DVec3>() / 4.0;
     let depth =
         ((near + far) * corners[0].length_squared() / (2.0 * corners[0].dot(axis))).min(far);

@@ -1,4 +1,4 @@
-//! Techniques: what a plan is made by.
+//! Techniques: which shadow maps a plan has, how they are warped and how they are looked up.
 
 mod code;
 mod filters;
@@ -9,11 +9,11 @@ use crate::error::{Error, check};
 use crate::plan::Face;
 use crate::visibility::Filter;
 
-/// One way to make shadows: which maps there are, how their texels are spread, and how they are
-/// looked up.
+/// One way to make shadows: which maps there are, how their texels are spread over what they cover,
+/// and how the maps are looked up.
 ///
-/// A technique is also a text, `WARP[+zK][+face][:FILTER][@TEXELS]`, which parses and prints both
-/// ways; [`language`] lists its words:
+/// A technique is also a text, `WARP[+zK][+face][:FILTER][@TEXELS]`, which can be parsed and
+/// printed; [`language`] lists its words:
 ///
 /// ```
 /// use umbrage::{Partition, Size, Technique, visibility::Filter};
@@ -34,12 +34,12 @@ pub struct Technique {
     pub warp: Warp,
     /// What each map covers.
     pub cover: Cover,
-    /// Which maps there are.
+    /// How the view is divided among maps.
     pub partition: Partition,
-    /// How the maps are looked up. The plan leaves room around them for what the filter reads, and
-    /// keeps the depths of distant casters where the filter asks for these.
+    /// How the maps are looked up. A plan leaves room around each map for the texels that the
+    /// filter reads, and keeps the depths of distant casters if the filter needs them.
     pub filter: Filter,
-    /// How many texels there are.
+    /// How many texels the maps have.
     pub size: Size,
 }
 
@@ -56,17 +56,17 @@ impl Default for Technique {
     }
 }
 
-/// What the device can hold.
+/// The texture sizes that the device allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// The longest side that the device allows a texture, texels, 1 ..= 65536.
+    /// The longest side of a texture, in texels, 1 ..= 65536.
     pub max_side: u32,
-    /// Sides of maps are multiples of this, texels, 1 ..= `max_side`.
+    /// The sides of all maps are multiples of this number of texels, 1 ..= `max_side`.
     pub align: u32,
 }
 
 impl Default for Limits {
-    /// Sides up to WebGPU's guaranteed 8192, of any number of texels.
+    /// Sides of up to 8192 texels, which WebGPU guarantees, without alignment.
     fn default() -> Self {
         Self { max_side: 8192, align: 1 }
     }
@@ -78,93 +78,101 @@ pub enum Cover {
     /// The receivers that the camera sees in the map's part of the view.
     #[default]
     Seen,
-    /// All of the scene's bounds, whatever the camera sees: where everyone starts. Without bounds,
-    /// the view frustum's bounding sphere. For [`Warp::Uniform`] alone.
+    /// All of the scene's bounds, whatever the camera sees. Without bounds, the bounding sphere of
+    /// the view frustum. Only for [`Warp::Uniform`].
     Scene,
     /// The bounding sphere of the map's part of the view frustum, whatever receivers there are. The
-    /// map is stable: its texels keep their places and their size in the world however the camera
-    /// moves or turns, since the map moves by whole texels. So shadows do not shimmer. Under spot
-    /// and point lights it covers all that the light shines on. For [`Warp::Uniform`] alone, not
-    /// with partitions by face, nor with [`Splits::Fitted`]; a map needs at least 2 × 2 texels.
+    /// map is stable: it moves by whole texels only, so its texels keep their positions and their
+    /// size in the world however the camera moves or turns, and shadows do not shimmer. Under spot
+    /// and point lights the map covers all that the light reaches.
+    ///
+    /// Only for [`Warp::Uniform`], neither with partitions by face nor with [`Splits::Fitted`]. A
+    /// stable map has at least 2 × 2 texels.
     Stable,
 }
 
 impl Cover {
-    /// Whether maps stay as they are whatever is seen of what they cover.
+    /// Whether a map's matrix is independent of which receivers the camera sees.
     pub(crate) fn is_fixed(self) -> bool {
         self != Self::Seen
     }
 
-    /// Of a side's texels, those that only leave room to move by whole texels.
+    /// The number of texels of a side that are reserved for moving the map by whole texels.
     pub(crate) fn spare_texels(self) -> u32 {
         u32::from(self == Self::Stable)
     }
 }
 
-/// How texels are spread over what a map serves.
+/// How texels are spread over the light plane.
 ///
-/// All but `Uniform` and `Psm` are one-point perspectives along light space's z axis and differ in λ
-/// alone, the distance from the centre of projection to the near plane. All but `Lambda` become
-/// `Uniform` smoothly as the view turns into the light. Along the light itself z has no direction to
-/// follow: as the view sweeps past, the map turns half around within the angle by which it misses,
-/// `Uniform`'s too.
+/// All warps but `Uniform` and `Psm` are one-point perspectives along light space's z axis. They
+/// differ only in λ, the distance from the centre of projection to the warp's near plane. All but
+/// `Lambda` turn smoothly into `Uniform` as the view direction approaches the light direction.
+///
+/// Where the view runs exactly along the light, the view direction does not define a z axis. While
+/// the view sweeps past the light direction, every map therefore makes half a turn, `Uniform`
+/// included, within about the angle by which the view misses the light direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warp {
     /// No warp: texels are spread evenly over the light plane.
     Uniform,
-    /// Perspective shadow maps (Stamminger and Drettakis 2002): the map looks from the light at the
-    /// world as it is after the viewer's own perspective. The depth stored is the light's own,
-    /// so casters behind the eye need no moving back of the viewer.
-    /// Where a spot light stands among what is seen so that no perspective shows all of it, `Uniform`.
+    /// Perspective shadow maps (Stamminger and Drettakis 2002): the light's view of the world after
+    /// the viewer's perspective. The depth stored is the light's own, not the one after the
+    /// viewer's perspective, so casters behind the eye do not require a virtual move of the viewer.
+    /// If a spot light stands amid the receivers seen so that no perspective shows them all, the
+    /// map is `Uniform`.
     Psm,
-    /// Light space perspective shadow maps (Wimmer et al. 2004): λ = (n + √(n f))/sin θ, with f drawn
-    /// in to n + μ sin θ where the tilt shrinks the warp's range (§4.4). n and f are the nearest and
-    /// farthest view distance of the receivers seen.
-    /// Under light within about φ of the view it can need several times the texels of `Uniform` for the same
-    /// largest error.
+    /// Light space perspective shadow maps (Wimmer et al. 2004): λ = (n + √(n f))/sin θ, where
+    /// n and f are the view distances of the nearest and the farthest receiver seen. f is limited
+    /// to n + μ sin θ, which is less than f where the tilt of the view shortens the warp's depth
+    /// range μ (§4.4). Where the angle θ between view and light is not much larger than φ, this
+    /// warp can need several times the texels of `Uniform` for the same largest error.
     Lispsm,
-    /// Trapezoidal shadow maps (Martin and Tan 2004, as Lloyd et al. 2006 describe them): what is
-    /// nearer than the focus distance gets 80% of the rows. Never stronger than λ = n/sin θ.
+    /// Trapezoidal shadow maps (Martin and Tan 2004, as Lloyd et al. 2006 describe them): receivers
+    /// nearer than the focus distance get 80% of the rows. λ is at least n/sin θ.
     Tsm {
-        /// Metres along the view, > 0; `None`: √(n f) of the receivers seen.
+        /// Focus distance along the view, metres, > 0; `None` stands for √(n f) of the receivers
+        /// seen.
         focus: Option<f64>,
     },
-    /// The λ that makes the objective smallest over the receivers seen, and never larger than
-    /// `Uniform` has it (under spot lights, with [`Objective::Area`]: by no more than one per cent). Where
-    /// sin θ < sin φ/4 it fades out. For thin strips, such as a slice of a flat floor, two values of λ can
-    /// be nearly as good; then a small motion may make it jump from one to the other.
+    /// The λ that minimises the objective over the receivers seen. The objective is never larger
+    /// than for `Uniform` (under spot lights, with [`Objective::Area`]: larger by one per cent at
+    /// most). Where sin θ < sin φ/4 the warp fades out.
+    ///
+    /// For thin strips, such as a slice of a flat floor, two distant values of λ can be nearly
+    /// equally good; then λ may jump from one to the other after a small motion.
     Adaptive(Objective),
-    /// Logarithmic rows behind the λ = n/sin θ perspective: the unreachable optimum. Only the CPU
-    /// reference can render it.
+    /// Logarithmic rows after the perspective with λ = n/sin θ: the optimum, which no GPU can
+    /// rasterise. Only the CPU reference renders it.
     Log,
-    /// λ as told: light-space metres, > 0, or infinite for no warp. (For spot lights, after
-    /// the light's perspective, in units of its image plane at unit distance.)
+    /// A perspective with this λ > 0 in light-space metres; infinite λ is no warp. (Under spot
+    /// lights λ counts in units of the light's image plane at distance 1.)
     Lambda(f64),
 }
 
-/// What [`Warp::Adaptive`] makes smallest.
+/// The quantity that [`Warp::Adaptive`] minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Objective {
-    /// The texels needed for a guaranteed error: largest m_s times largest m_t.
+    /// The number of texels needed for a guaranteed error: the largest m_s times the largest m_t.
     #[default]
     Storage,
-    /// The largest m_s·m_t at any one point: the worst texel's area.
+    /// The largest area of a texel on screen: the largest product m_s·m_t at any one point.
     Area,
 }
 
-/// How what the camera sees is divided among maps. The number of maps depends on nothing else, but for
-/// the lights' number and kind; those that have nothing to serve are empty.
+/// How the view is divided among maps. The number of maps depends on the partition and on the
+/// number and kinds of the lights alone. Maps without receivers are empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Partition {
-    /// Slices along the view, 1 ..= [`MAX_SLICES`](Self::MAX_SLICES).
+    /// Number of slices (cascades) along the view, 1 ..= [`MAX_SLICES`](Self::MAX_SLICES).
     pub slices: u32,
-    /// Where slices meet.
+    /// Where neighbouring slices meet.
     pub splits: Splits,
-    /// How far each slice reaches into the next one, as a share of its own length, 0 ..= 1. There
-    /// [`Plan::lookup`](crate::Plan::lookup) fades from one map to the next.
+    /// How far each slice reaches into the next one, as a share of its own length, 0 ..= 1. In this
+    /// overlap [`Plan::lookup`](crate::Plan::lookup) fades from one map to the next.
     pub overlap: f64,
-    /// Whether the view frustum's faces get maps of their own.
+    /// Whether the faces of the view frustum have maps of their own.
     pub faces: Faces,
 }
 
@@ -172,65 +180,68 @@ impl Partition {
     /// The largest number of slices.
     pub const MAX_SLICES: usize = 16;
 
-    /// This many self-similar slices.
+    /// A partition into self-similar slices.
     pub fn slices(slices: u32) -> Self {
         Self { slices, ..Self::default() }
     }
 }
 
-/// One map for all.
+/// One map for the whole view.
 impl Default for Partition {
     fn default() -> Self {
         Self { slices: 1, splits: Splits::SelfSimilar, overlap: 0.0, faces: Faces::Whole }
     }
 }
 
-/// Where slices along the view meet. n and f are the nearest and farthest view distance of the
-/// receivers seen; for [`Cover::Stable`] the camera's own.
+/// Where slices along the view meet. n and f are the view distances of the nearest and the farthest
+/// receiver seen; for [`Cover::Stable`] they are the camera's near and far distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Splits {
-    /// At n (f/n)^(i/K): slices are alike but for their size (Lloyd et al. 2006, Eqs. 15, 16).
+    /// At n (f/n)^(i/K) for i = 1 ..= K − 1, so that all slices have the same shape (Lloyd et al.
+    /// 2006, Eqs. 15, 16).
     SelfSimilar,
-    /// A blend of even slices (0) and self-similar ones (1): the `practical` scheme of parallel-split
-    /// shadow maps (Zhang et al. 2006).
+    /// A blend between slices of equal length (0) and self-similar ones (1): the practical split
+    /// scheme of parallel-split shadow maps (Zhang et al. 2006).
     Practical(f64),
-    /// At these distances, metres, ascending; as many as there are slices less one, the rest is ignored.
+    /// At these distances along the view, metres, ascending. Only the first K − 1 are used.
     At([f64; Partition::MAX_SLICES - 1]),
-    /// Where every slice's map needs as many texels as the next for the same error, by the errors over
-    /// the receivers really there.
+    /// Where all slices' maps need equally many texels for the same error over the receivers seen.
     Fitted,
 }
 
-/// Whether the view frustum's faces, as seen from the light, get maps of their own (Lloyd et al. 2006,
-/// §5.1): its front faces where the light comes from behind the viewer, else its back faces.
+/// Whether the faces of the view frustum have maps of their own (Lloyd et al. 2006, §5.1). The
+/// faces used are the frustum's front faces, as seen from the light, if the light comes from behind
+/// the viewer, and its back faces otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Faces {
-    /// No: maps serve the frustum as a whole.
+    /// No: each map serves the frustum as a whole.
     #[default]
     Whole,
-    /// The four side faces, each cut into slices, and the near face: 4 K + 1 maps.
+    /// The four side faces, each cut into K slices, and the near face: 4 K + 1 maps.
     SidesAndNear,
-    /// The four side faces alone, reaching to the eye to cover the near face: 4 K maps.
+    /// The four side faces alone, whose maps reach to the eye and serve the near face too: 4 K
+    /// maps.
     Sides,
 }
 
-/// How many texels a plan has.
+/// How many texels a plan's maps have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Size {
-    /// At most this many texels in all, 1 ..= 2³² and at least one for each map, divided among maps, and
-    /// in each between s and t, so that the largest errors of all are equal (Lloyd et al. 2006, Eqs. 13, 14).
+    /// At most this many texels in all, 1 ..= 2³² and at least one for each map. They are divided
+    /// among the maps, and in each map between s and t, so that all largest errors are equal (Lloyd
+    /// et al. 2006, Eqs. 13, 14).
     Budget(u64),
-    /// Every map has exactly this size, texels in s and t.
+    /// Every map has exactly this many texels in s and t.
     Exact([u32; 2]),
-    /// The fewest texels with which no map's largest error, in the worst direction, exceeds this many
-    /// pixels per texel, > 0: the critical resolution if it is 1.
+    /// The fewest texels with which no map's largest error in the worst direction exceeds this many
+    /// pixels per texel, > 0. An error of 1 gives the critical resolution.
     MaxError(f64),
 }
 
 impl Technique {
-    /// That every value makes sense, and that they go together. A [`Planner`](crate::Planner) checks
-    /// this itself.
+    /// Checks that all values are in their ranges and can be combined. A
+    /// [`Planner`](crate::Planner) does this check itself.
     ///
     /// # Errors
     /// Names the first field that is out of its range.
@@ -283,7 +294,7 @@ impl Technique {
 }
 
 impl Limits {
-    /// That the limits make sense, and that maps of a technique keep within them.
+    /// Checks that the limits are in their ranges and that they allow the technique's size.
     pub(crate) fn check(&self, technique: &Technique) -> Result<(), Error> {
         let Self { max_side, align } = *self;
         check((1..=65536).contains(&max_side), "limits.max_side", || {
@@ -293,7 +304,7 @@ impl Limits {
             format!("must be 1 to max_side ({max_side}) texels, is {align}")
         })?;
         if let Size::Exact(size) = technique.size {
-            let fits = |n: &u32| (1..=max_side).contains(n) && n.is_multiple_of(align);
+            let fits = |n: &u32| (1..=max_side).contains(n) && n % align == 0;
             check(size.iter().all(fits), "technique.size", || {
                 format!(
                     "must be multiples of {align} from {align} to {max_side} texels each way, is {}x{}",
@@ -342,8 +353,8 @@ impl Partition {
         }
     }
 
-    /// The faces that maps are for, in the order of the maps; `None` is the whole frustum. The near
-    /// face has one map, every other one for each slice.
+    /// The faces that have maps, in the order of the maps; `None` is the whole frustum. The near
+    /// face has one map, every other face one for each slice.
     pub(crate) fn face_list(&self) -> &'static [Option<Face>] {
         use Face::{Bottom, Left, Near, Right, Top};
         match self.faces {

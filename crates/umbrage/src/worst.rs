@@ -1,17 +1,21 @@
-//! Largest errors of a map over a body, to a known tolerance.
+//! The largest errors of a map over a body, to a known tolerance.
 //!
-//! With A the footprint (metres per texel), w the projection's fourth coordinate and z the view depth,
-//! A = w·B, where B is affine in the point for parallel light, and an affine matrix over the
-//! distance from the light for a spot. So on a simplex
+//! Let A be the footprint (metres per texel), w the projection's fourth coordinate and z the view
+//! depth. Then A = w·B. Under parallel light B is affine in the point; under a spot light B = (r
+//! × K)/|r|, where r is the vector from the light to the point and r × K is affine. On a simplex,
+//! therefore,
 //!
-//! - w/z and (spot lights) w/(r·m), with m a fixed unit vector and r the way from the light, are
-//!   ratios of linear functions: largest at corners;
-//! - ‖B‖ and ‖r × K‖/z are convex or quasi-convex: largest at corners;
+//! - w/z, and under spot lights w/(r·m) with a fixed unit vector m, are ratios of linear functions
+//!   and largest at corners;
+//! - ‖B‖ under parallel light and ‖r × K‖/z under spot lights are convex or quasi-convex
+//!   and largest at corners;
 //!
-//! and products of corner maxima bound the error. Where the bound exceeds the best value known by more
-//! than the tolerance the simplex is halved. The largest error lies on a face of the body, because
-//! along a beam errors go with 1/z or r/z. For parallel light and a one-point perspective it lies on an
-//! edge: within a plane of constant w the error is quasi-convex, so it grows towards the border.
+//! and products of maxima over the corners bound the error. A simplex whose bound exceeds the
+//! largest error found by more than the tolerance is halved.
+//!
+//! The largest error lies on a face of the body, because along a beam errors are proportional to
+//! 1/z or to |r|/z. For parallel light and a one-point perspective it lies on an edge: within a
+//! plane of constant w the error is quasi-convex, so it is largest at the border.
 
 use crate::aliasing::Local;
 use crate::camera::Camera;
@@ -21,17 +25,18 @@ use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// The reported maximum may exceed the true one by this share.
+/// The share by which the reported maximum may exceed the true one.
 const TOLERANCE: f64 = 0.01;
-/// Halvings after which the bounds that are left are taken as they are. Parallel light needs dozens;
-/// spot lights near what they shine on, and views of many orders of magnitude, get here.
+/// Number of halvings after which the remaining bounds are reported as they are. Parallel light
+/// needs dozens; only spot lights near their receivers and views over many orders of magnitude
+/// reach this number.
 const MAX_SPLITS: usize = 1000;
 
-/// Values at a corner of a simplex.
+/// The errors and their factors at a corner of a simplex.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     p: DVec3,
-    /// Errors s, t, worst, metres per texel over view depth.
+    /// Errors in s, in t and in the worst direction, metres per texel over view depth.
     errors: [f64; 3],
     /// Distance from the light; 1 for parallel light.
     r: f64,
@@ -39,17 +44,17 @@ struct Corner {
     z: f64,
     /// Direction in which a texel's height is measured, of any length.
     normal_t: DVec3,
-    /// Share by which logarithmic rows shrink texels in t here; 1 for even rows.
+    /// Factor by which logarithmic rows change a texel's size in t here; 1 for even rows.
     row_scale: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Simplex {
-    /// Indices of corners. The third repeats the second on an edge.
+    /// Indices of corners. On an edge the third one repeats the second.
     corners: [u32; 3],
     /// Upper bounds of the errors.
     bound: [f64; 3],
-    /// Largest ratio of a bound to the best value known when the bound was found.
+    /// Largest ratio of a bound to the largest error found when the bound was computed.
     urgency: f64,
 }
 
@@ -77,12 +82,12 @@ impl Eq for Simplex {}
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Buffers {
     corners: Vec<Corner>,
-    /// Simplices whose bound exceeds the best value known by more than the tolerance.
+    /// Simplices whose bound exceeds the largest error found by more than the tolerance.
     open: BinaryHeap<Simplex>,
 }
 
-/// Largest errors of `map` over `body` (local space), pixels per texel: never less than the true
-/// maximum, and at most one per cent more in all but extreme views.
+/// The largest errors of `map` over `body` (local space), pixels per texel: never less than the
+/// true maximum, and at most one per cent more in all but extreme views.
 pub(crate) fn worst_errors(
     map: &ShadowMap,
     body: &Body,
@@ -96,7 +101,7 @@ pub(crate) fn worst_errors(
     open.clear();
     let best = corners.iter().fold([0f64; 3], |best, c| larger(best, c.errors));
     let mut search = Search { probe, corners, open, best, settled: best };
-    // Bodies smaller than rounding at their distance have corners that the map does not reach.
+    // If a body is smaller than the rounding of its position, the map may not apply at its corners.
     if search.corners.len() == body.vertices().len() {
         if search.probe.edges_suffice() {
             body.edges().for_each(|[a, b]| search.add([a, b, b].map(|i| i as u32)));
@@ -105,13 +110,13 @@ pub(crate) fn worst_errors(
         }
         for _ in 0..MAX_SPLITS {
             let Some(most_urgent) = search.open.pop() else { break };
-            // `best` may have grown since.
+            // `best` may have increased since the simplex was pushed.
             if !search.settle(most_urgent.bound) {
                 search.split(&most_urgent);
             }
         }
     }
-    // What is still open counts with its bound, where there is one.
+    // Simplices that are still open count with their bounds, if these are finite.
     let bounds = search.open.iter().fold(search.settled, |bounds, s| {
         larger(bounds, s.bound.map(|b| if b.is_finite() { b } else { 0.0 }))
     });
@@ -128,9 +133,9 @@ struct Search<'a> {
     probe: Probe<'a>,
     corners: &'a mut Vec<Corner>,
     open: &'a mut BinaryHeap<Simplex>,
-    /// Largest errors found.
+    /// The largest errors found.
     best: [f64; 3],
-    /// Bounds of what was put aside because it exceeds `best` by no more than the tolerance.
+    /// Bounds of the simplices put aside, which exceed `best` by the tolerance at most.
     settled: [f64; 3],
 }
 
@@ -140,8 +145,9 @@ impl Search<'_> {
         let [a, b, c] = corners.map(|i| self.corners[i as usize]);
         let mut bound = self.probe.bound(&[a, b, c]);
         if is_edge {
-            // B's first column is constant and w²/z convex: corners have the largest m_s and m_t.
-            // With logarithmic rows A itself is affine, and corners have the largest of all.
+            // B's first column is constant and w²/z is convex, so m_s and m_t are largest at the
+            // corners. With logarithmic rows A itself is affine, and all errors are largest at the
+            // corners.
             let exact = if self.probe.map.rows == Rows::Even { 2 } else { 3 };
             bound[..exact].copy_from_slice(&larger(a.errors, b.errors)[..exact]);
         }
@@ -165,7 +171,7 @@ impl Search<'_> {
     fn split(&mut self, simplex: &Simplex) {
         let [a, b, c] = simplex.corners;
         let is_edge = b == c;
-        // View depth decides what "long" means: far away, less matters.
+        // Lengths count relative to view depth, because distant parts matter less.
         let length = |&(u, v, _): &(u32, u32, u32)| {
             let [u, v] = [u, v].map(|i| &self.corners[i as usize]);
             u.p.distance_squared(v.p) / (u.z * v.z)
@@ -173,7 +179,7 @@ impl Search<'_> {
         let sides = [(a, b, c), (b, c, a), (c, a, b)];
         let longest = sides.into_iter().max_by(|p, q| length(p).total_cmp(&length(q)));
         let (u, v, rest) = if is_edge { sides[0] } else { longest.unwrap_or(sides[0]) };
-        // The point halfway in 1/z keeps the two halves' ranges of z alike.
+        // Halving at the middle of 1/z gives both halves similar ranges of z.
         let [p, q] = [u, v].map(|i| &self.corners[i as usize]);
         let Some(middle) = self.probe.corner(p.p.lerp(q.p, p.z / (p.z + q.z))) else { return };
         self.best = larger(self.best, middle.errors);
@@ -185,7 +191,7 @@ impl Search<'_> {
     }
 }
 
-/// What is known of errors at a point and over a simplex.
+/// Computes errors at points and their bounds over simplices.
 struct Probe<'a> {
     map: &'a ShadowMap,
     camera: &'a Camera,
@@ -207,26 +213,28 @@ impl Probe<'_> {
         })
     }
 
-    /// Whether the largest errors lie on edges: parallel light and a warp along one axis.
+    /// Whether the largest errors lie on edges, which is so for parallel light and a warp along one
+    /// axis.
     fn edges_suffice(&self) -> bool {
         let [t, w] = [1, 3].map(|i| self.map.shadow_from_local.row(i).truncate());
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
     }
 
-    /// Upper bounds for s, t and worst over a simplex.
+    /// Upper bounds over a simplex of the errors in s, in t and in the worst direction.
     fn bound(&self, corners: &[Corner; 3]) -> [f64; 3] {
         let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
         let w_over_z = max(&|c| c.w / c.z);
-        // m_t = w²/|N| with N = w² ∇t affine, whose length is at least its share along any fixed
-        // direction: the ratio of w to that share is again largest at a corner. (With logarithmic
-        // rows the ratio has light space's own w on top.)
+        // m_t = w²/|N|, where N = w² ∇t is affine. |N| is at least its component along any
+        // fixed direction, and the ratio of w to that component is again largest at a corner. (With
+        // logarithmic rows this ratio has light space's own w as a further factor.)
         let normal = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
         let t = w_over_z
             * max(&|c| {
                 let cos = c.normal_t.dot(normal) / c.normal_t.length();
                 if cos > 0.0 { c.errors[1] * c.z / c.w / cos } else { f64::INFINITY }
             });
-        // Logarithmic rows scale B's second column, by at most this much differently within the simplex.
+        // Logarithmic rows scale B's second column. Within the simplex the scale varies by this
+        // factor at most.
         let spread = max(&|c| c.row_scale) * max(&|c| c.row_scale.recip());
         let norm = |i: usize| match self.map.apex {
             None => {
@@ -235,8 +243,9 @@ impl Probe<'_> {
                 (w_over_z * affine).min(max(&|c| c.w) * over_z)
             }
             Some(apex) => {
-                // ‖A‖/z = w ‖r × K‖/(|r| z), and |r| is at least its share along a fixed direction. That
-                // share may go with w or with ‖r × K‖.
+                // ‖A‖/z = w ‖r × K‖/(|r| z), and |r| is at least its component along a
+                // fixed direction. The bound may combine that component with w or with ‖r ×
+                // K‖.
                 let middle = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
                 let per_share = |value: &dyn Fn(&Corner) -> f64| {
                     max(&|c| {

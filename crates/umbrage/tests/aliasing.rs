@@ -27,7 +27,7 @@ proptest! {
     ) {
         let (name, spread) = WARPS[pick];
         let camera = config.camera;
-        // Differences of coordinates far from the origin have no digits left.
+        // Differences of coordinates far from the origin lose all digits.
         prop_assume!(camera.eye().length() < 1e3 * camera.near().max(0.1));
         let mut planner = planner();
         let plan = planner.plan(&camera, &[config.light], &config.bounds, &technique(spread)).unwrap();
@@ -42,7 +42,7 @@ proptest! {
                 let d_t = (at(0.0, 1.0)? - at(0.0, -1.0)?) / (2.0 * step * res_t);
                 Some((d_s, d_t))
             };
-            // Two steps: how much they disagree tells how far differences can be trusted.
+            // The disagreement of differences at two steps tells how accurate they are.
             let differences = |normal: DVec3| {
                 let (coarse, fine) = (difference(normal, 1e-5)?, difference(normal, 1e-6)?);
                 let trust = coarse.0.distance(fine.0) + coarse.1.distance(fine.1);
@@ -65,7 +65,7 @@ proptest! {
 
             let Some((d_s, d_t, _)) = differences(normal) else { continue };
             let error = map.surface_error(&camera, p, normal).unwrap();
-            // A hundredth of a pixel, by the error's own account.
+            // A hundredth of a pixel, according to the error computed.
             let tiny = 1e-2 / error.worst;
             let [Some(here), Some(by_s), Some(by_t)] =
                 [p, p + d_s * tiny, p + d_t * tiny].map(|q| camera.pixel(q))
@@ -81,7 +81,8 @@ proptest! {
         }
     }
 
-    /// The plane of a receiver is a plane in shadow space: its depth elsewhere follows from the slope.
+    /// A receiver's plane is a plane in shadow space, so its depth at other points follows from the
+    /// slope.
     #[test]
     fn receiver_planes_are_planes(
         config in config(),

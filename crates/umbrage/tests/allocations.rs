@@ -1,4 +1,4 @@
-//! A steady frame allocates nothing.
+//! A steady frame allocates no memory.
 
 #![allow(unsafe_code, reason = "counting allocations needs a global allocator")]
 
@@ -75,7 +75,7 @@ fn steady_frames_do_not_allocate() {
     let mut cases: Vec<(&[Light], Technique)> = Vec::new();
     for text in texts {
         for partition in partitions {
-            // Fitting all sides of a point light takes long.
+            // Fitted slices of all sides of a point light take too long.
             let count = if partition.splits == Splits::Fitted { 2 } else { 3 };
             cases.push((&lights[..count], Technique { partition, ..technique(text) }));
         }
@@ -94,7 +94,7 @@ fn steady_frames_do_not_allocate() {
                 planner.plan(&camera(frame), lights, &bounds, &technique).unwrap();
             }
         };
-        // Buffers change places: it takes a few rounds until all have grown.
+        // Buffers are swapped with each other, so all have grown only after a few rounds.
         (0..3).for_each(|_| orbit());
         let before = ALLOCATIONS.with(Cell::get);
         assert!(before > 0, "the counter counts");

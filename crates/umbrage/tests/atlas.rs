@@ -7,7 +7,7 @@ use umbrage::{
     Atlas, AtlasTooLarge, Bounds, Camera, Light, LookAt, Place, Plan, Planner, ShadowMap, Technique,
 };
 
-/// Any map; only its resolution matters here.
+/// A map of which only the resolution matters.
 fn map() -> ShadowMap {
     let camera = Camera::look_at(LookAt {
         eye: DVec3::ZERO,
@@ -30,7 +30,7 @@ fn plan(resolutions: &[[u32; 2]]) -> Plan {
     Plan { maps: maps.collect(), ..Plan::default() }
 }
 
-/// The plan's maps as they are, with gutters of any width.
+/// The slots of the plan's maps, with gutters of any width.
 fn packed(plan: &Plan, gutter: u32, max_side: u32) -> Result<Atlas, AtlasTooLarge> {
     Atlas::packed_sizes(&resolutions(plan), gutter, max_side)
 }
@@ -43,7 +43,7 @@ fn resolutions(plan: &Plan) -> Vec<[u32; 2]> {
     plan.maps.iter().map(|m| m.resolution).collect()
 }
 
-/// Gutters, and where maps begin, follow from the filter that a plan is for.
+/// The width of gutters and the alignment of maps follow from the filter of the plan.
 #[test]
 fn an_atlas_leaves_what_the_plans_filter_reads() {
     let sizes = [[100, 201], [31, 77], [0, 0], [65, 33]];
@@ -67,7 +67,7 @@ fn an_atlas_leaves_what_the_plans_filter_reads() {
     }
 }
 
-/// Corners of a place with its gutter: smallest and largest.
+/// The smallest and the largest corner of a place with its gutter.
 fn with_gutter(place: Place, gutter: u32) -> [[i64; 2]; 2] {
     let g = i64::from(gutter);
     [0, 1].map(|end| {
@@ -78,7 +78,7 @@ fn with_gutter(place: Place, gutter: u32) -> [[i64; 2]; 2] {
     })
 }
 
-/// All that must hold of an atlas of a plan.
+/// Checks everything that must hold for an atlas of a plan.
 fn check(atlas: &Atlas, plan: &Plan, gutter: u32, max_side: u32) -> Result<(), TestCaseError> {
     prop_assert_eq!(atlas.gutter_texels, gutter);
     prop_assert_eq!(atlas.places.len(), plan.maps.len());
@@ -98,7 +98,7 @@ fn check(atlas: &Atlas, plan: &Plan, gutter: u32, max_side: u32) -> Result<(), T
         end = [end[0].max(high[0]), end[1].max(high[1])];
         layers[place.layer as usize].push([low, high]);
 
-        // The first and the last texel's outer corners, and where the map's middle lies.
+        // The outer corners of the first and the last texel, and the map's middle.
         let [x, y] = place.origin.map(f64::from);
         let [w, h] = place.size.map(f64::from);
         let texels = atlas.texels_from_shadow(i).unwrap();
@@ -111,7 +111,8 @@ fn check(atlas: &Atlas, plan: &Plan, gutter: u32, max_side: u32) -> Result<(), T
     }
     prop_assert_eq!(atlas.size.map(i64::from), end, "no empty margin");
     for rectangles in &mut layers {
-        // By their left sides: what begins right of another's end needs no look.
+        // Sorted by their left sides, places need no comparison with those that begin right of
+        // them.
         rectangles.sort_unstable();
         for (i, a) in rectangles.iter().enumerate() {
             for b in rectangles[i + 1..].iter().take_while(|b| b[0][0] < a[1][0]) {
@@ -122,13 +123,13 @@ fn check(atlas: &Atlas, plan: &Plan, gutter: u32, max_side: u32) -> Result<(), T
     Ok(())
 }
 
-/// Sides from 1 to `max` texels, by their logarithm; now and then none.
+/// Sides from 1 to `max` texels, uniform in their logarithm, and sometimes 0.
 fn resolution(max: u32) -> impl Strategy<Value = [u32; 2]> {
     let side = (0.0..f64::from(max).ln()).prop_map(|x| x.exp() as u32);
     prop_oneof![9 => [side.clone(), side.clone()], 1 => Just([0, 0])]
 }
 
-/// A budget divided among as many maps as plans have, of more or less different areas and shapes.
+/// A budget divided among as many maps as plans have, with more or less different areas and shapes.
 fn shares() -> impl Strategy<Value = Vec<[u32; 2]>> {
     (1usize..=65, 0.0..2.0f64, 0.0..1.5f64).prop_flat_map(|(n, areas, shapes)| {
         let share = [-1.0..1.0f64, -1.0..1.0].prop_map(move |[a, b]| {
@@ -165,7 +166,7 @@ proptest! {
                 Err(e) => {
                     prop_assert_eq!(e.maps, plan.maps.iter().filter(|m| !m.is_empty()).count());
                     prop_assert_eq!(e.max_side, max_side);
-                    // Four times the room is always enough.
+                    // Four times the area of all rectangles is always enough.
                     let room = u64::from(max_side).pow(2);
                     prop_assert!(!fits || e.texels > room / 4, "{e}");
                 }
@@ -174,7 +175,7 @@ proptest! {
         prop_assert_eq!(packed(&plan, gutter, max_side), packed(&plan, gutter, max_side));
     }
 
-    /// No single map wastes anything, and the layers are as large as they have to be.
+    /// A single map wastes no texels, and layers are no larger than necessary.
     #[test]
     fn one_map_is_its_own_atlas(size in resolution(60000), gutter in 0u32..100) {
         prop_assume!(size[0] > 0);
@@ -185,8 +186,8 @@ proptest! {
     }
 }
 
-/// Over many random plans, most of them of maps far less alike than those of real views. The worst
-/// are strips that cross, which no packing helps.
+/// Fill of atlases over many random plans, most of whose maps differ more than those of real views.
+/// The worst are plans of crossing strips, which no packing can fill.
 #[test]
 fn little_room_is_wasted() {
     let mut runner = proptest::test_runner::TestRunner::deterministic();
@@ -201,7 +202,7 @@ fn little_room_is_wasted() {
         sum += fill;
         worst = worst.min(fill);
     }
-    // 0.867 and 0.379 when this was written.
+    // The values were 0.867 and 0.379 when this test was written.
     assert!(sum / f64::from(plans) > 0.86, "{}", sum / f64::from(plans));
     assert!(worst > 0.35, "{worst}");
 }
@@ -212,7 +213,7 @@ fn equal_maps_leave_no_gap() {
         let atlas = packed(&plan(&vec![[508; 2]; n]), 2, 8192).unwrap();
         assert!(sizes.map(|s| s.map(|k| k * 512)).contains(&atlas.size), "{n}: {:?}", atlas.size);
     }
-    // And they fill a texture to its last texel.
+    // These maps fill a texture to its last texel.
     let full = plan(&[[8192; 2]; 4]);
     assert_eq!(packed(&full, 0, 16384).unwrap().size, [16384; 2]);
     let error = packed(&full, 1, 16384).unwrap_err();
@@ -239,7 +240,7 @@ fn extremes() {
     check(&atlas, &tiny, 1, 8192).unwrap();
     assert!(fill(&atlas, &tiny) > 0.95, "{}", fill(&atlas, &tiny));
 
-    // A giant among dwarfs, and strips both ways.
+    // One large map among small ones, and strips in both directions.
     let mixed = plan(&[[16000, 16000], [1, 1], [16384, 1], [1, 16384], [0, 0], [300, 20]]);
     let atlas = packed(&mixed, 0, 16385).unwrap();
     check(&atlas, &mixed, 0, 16385).unwrap();
@@ -253,7 +254,7 @@ fn extremes() {
     assert_eq!(packed(&plan(&[[64, 64]]), 7, u32::MAX).unwrap().size, [78, 78]);
 }
 
-/// Empty maps take no place in an atlas and keep theirs among the layers.
+/// Empty maps have no place in an atlas, but keep their layer.
 #[test]
 fn layers_do_not_move() {
     let atlas = layered(&plan(&[[100, 30], [0, 0], [20, 50]]), 4, 8192).unwrap();

@@ -1,4 +1,4 @@
-//! Culling of casters against brute force: whatever is hit on the way from a receiver to the light.
+//! Culling of casters against brute force: everything that a ray from a receiver to the light hits.
 
 mod common;
 
@@ -13,7 +13,8 @@ use umbrage::{
     Aabb, Bounds, Camera, Light, LookAt, Objective, Partition, SpotLight, Technique, Warp,
 };
 
-/// Where the way from `p` to the light ends, in lengths of the vector given; parallel light's goes on.
+/// The end of the ray from `p` to the light, as a multiple of the given vector; infinite for
+/// parallel light.
 fn way_to_light(light: &Light, p: DVec3) -> (DVec3, f64) {
     match light {
         Light::Directional { direction } => (-*direction, f64::INFINITY),
@@ -50,7 +51,7 @@ fn hits_triangle([a, b, c]: [DVec3; 3], p: DVec3, way: DVec3, end: f64) -> bool 
     u > 0.0 && v > 0.0 && u + v < 1.0 && t > 0.0 && t < end
 }
 
-/// Things that stand about the scene: a place and three vectors of a size.
+/// Objects in the scene: a position and three vectors of a certain length each.
 fn things() -> impl Strategy<Value = Vec<([f64; 3], [DVec3; 3], f64, bool)>> {
     let place = [-1.0..2.0f64, -1.0..2.0, -1.0..2.0];
     let size = (-7.0..1.0f64).prop_map(f64::exp);
@@ -58,7 +59,7 @@ fn things() -> impl Strategy<Value = Vec<([f64; 3], [DVec3; 3], f64, bool)>> {
     proptest::collection::vec((place, shape, size, any::<bool>()), 24)
 }
 
-/// Middle and size of a box around what is seen.
+/// Centre and size of a box around what is seen.
 fn seen(config: &Config) -> (DVec3, f64) {
     let around = Aabb::around(config.corners());
     (config.camera.eye() + around.center(), around.size().length())
@@ -80,7 +81,7 @@ fn whatever_is_hit_may_cast() {
             let (name, spread) = WARPS[pick];
             let partition = possible(partition, spread);
             let technique = Technique { partition, ..technique(spread) };
-            // Millions of boxes are enough.
+            // Millions of boxes suffice.
             prop_assume!(
                 map_count(&partition, &config.light) <= 100 && config.corners().len() >= 4
             );
@@ -90,8 +91,8 @@ fn whatever_is_hit_may_cast() {
             let receivers = config.seen_points(&numbers);
             let (middle, size) = seen(&config);
             for (i, (place, shape, scale, is_triangle)) in things.into_iter().enumerate() {
-                // Half of the things stand on some receiver's way to the light, off to the side by about their
-                // own size; half are anywhere.
+                // Half of the objects stand between some receiver and the light, shifted sideways
+                // by about their own size; the other half are anywhere.
                 let scale = scale * size;
                 let anywhere = middle + (DVec3::from(place) - 0.5) * size;
                 let center = match receivers.get(i) {
@@ -147,7 +148,8 @@ fn camera(far: f64) -> Camera {
     .unwrap()
 }
 
-/// Maps that keep their casters tell how far these lie; the others flatten what lies before the receivers.
+/// Maps that keep their casters' depths tell them apart; other maps clamp those before the
+/// receivers.
 #[test]
 fn casters_keep_their_depths_if_asked() {
     let camera = camera(100.0);
@@ -165,7 +167,7 @@ fn casters_keep_their_depths_if_asked() {
             range: 200.0,
         })
     };
-    // The second lamp hangs amid the casters: those next to it are flattened.
+    // The second lamp hangs amid the casters, and those next to it are clamped.
     let sun = Light::Directional { direction: DVec3::new(0.5, -1.0, 0.2) };
     for spread in [Warp::Uniform.into(), Warp::Lispsm.into(), Warp::Psm.into(), STABLE] {
         for (index, light) in [sun, spot(60.0), spot(30.0)].into_iter().enumerate() {
@@ -198,7 +200,7 @@ fn casters_keep_their_depths_if_asked() {
                 nearest
             };
             let [kept, flat] = [Filter::Pcss { n: 4, light: size }, Filter::Hard].map(&mut nearest);
-            // All that a stable map's lamp shines on lies in its depths anyway.
+            // The depths of a stable map under a lamp include everything that the lamp reaches.
             let flattens = spread != STABLE || index == 0;
             assert!(
                 kept >= -1e-9 && (flat < -0.4 || !flattens),
@@ -233,7 +235,7 @@ fn casters_beside_a_map_count_as_far_as_filters_reach() {
                 }
                 let st = map.project(point).unwrap().truncate();
                 served += 1;
-                // Above what lies ten texels aside.
+                // A caster above a point ten texels to the side.
                 for aside in [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
                     let beam = map.beam(st + aside * 10.0 * texel).unwrap();
                     let high = beam.origin - beam.direction * 5.0;

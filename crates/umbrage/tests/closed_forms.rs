@@ -23,7 +23,7 @@ fn camera(n: f64, f: f64) -> Camera {
     .unwrap()
 }
 
-/// Light in the YZ plane, travelling at `theta` to the view and downwards: overhead at 90°.
+/// Light in the YZ plane, travelling downwards at the angle `theta` to the view; 90° is overhead.
 fn sun(theta: f64) -> Light {
     Light::Directional { direction: DVec3::new(0.0, -theta.sin(), -theta.cos()) }
 }
@@ -62,7 +62,7 @@ fn overhead_light_matches_lloyd_et_al() {
         (Warp::Lambda(2.5), 2.5),
         (Warp::Lambda(300.0), 300.0),
         (Warp::Uniform, 1e15),
-        // δ = √(n f) − n of μ = f − n at 80%.
+        // δ = √(n f) − n, of μ = f − n, lies at 80%.
         (Warp::Tsm { focus: None }, 99.0 * 9.0 * 0.2 / (0.8 * 99.0 - 9.0)),
     ];
     for (warp, lambda) in warps {
@@ -77,7 +77,7 @@ fn overhead_light_matches_lloyd_et_al() {
                 assert_close(error.t, t * scale[1], 1e-6, &format!("m_t of {warp:?} at z = {z}"));
             }
         }
-        // W&P 9 and 10: largest at the near plane, and at the nearer or farther end.
+        // W&P Eqs. 9 and 10: m_s is largest at the near plane, m_t at one of the ends.
         let ends = [N, F].map(|z| overhead(N, F, lambda, z));
         assert_close(map.error.max_s, ends[0][0] * scale[0], 1e-6, "M_s");
         assert_close(map.error.max_t, ends[0][1].max(ends[1][1]) * scale[1], 1e-6, "M_t");
@@ -141,7 +141,7 @@ fn tilted(theta: f64, lambda: f64, y: f64, z: f64) -> [f64; 2] {
     } else {
         (2.0 * F * k * cos, (F * k - (F - z) * tan - y) * cos + lambda, F * k / lambda)
     };
-    // Near corners bind where λ is short.
+    // The near corners determine W's width if λ is small.
     let near_w = if theta >= PHI { lambda } else { (F * k - (F - N) * tan - N * k) * cos + lambda };
     let tan_phi_w = far_fit.max(N * k / near_w);
     [2.0 * tan_phi_w / k * z_w / z, mu / (k * (lambda + mu) * lambda) * z_w * z_w / z]
@@ -180,7 +180,7 @@ fn tilted_light_matches_zhang_et_al() {
     }
 }
 
-/// The direction-adaptive optimum: λ*(θ) in closed form, and the storage it needs in units of Theory's
+/// The direction-adaptive optimum: λ*(θ) in closed form, and its storage in units of Theory's
 /// M_q·M_p = 4 S̄.
 #[test]
 fn adaptive_finds_the_optimum() {
@@ -221,7 +221,7 @@ fn adaptive_finds_the_optimum() {
         }
         let texels = plan.texels() as f64;
         let e_product = 4.0 * worst * texels / f64::from(IMAGE).powi(2);
-        // The reference's λ came from a coarser search: ours may only be better.
+        // The reference λ came from a coarser search, so ours may be better but not worse.
         assert_close(
             e_product,
             area,
@@ -232,7 +232,7 @@ fn adaptive_finds_the_optimum() {
     }
 }
 
-/// Looking along the light, or nearly so, every warp that follows the view has become uniform.
+/// If the view runs exactly or nearly along the light, every warp that follows the view is uniform.
 #[test]
 fn warps_fade_as_the_view_turns_into_the_light() {
     let camera = camera(N, F);
@@ -258,11 +258,12 @@ fn warps_fade_as_the_view_turns_into_the_light() {
     }
 }
 
-/// The forms as printed fail against the measured matrices, so that nobody "corrects" ours back to them.
+/// The formulas as printed disagree with the measured matrices, so that nobody "corrects" ours back
+/// to them.
 #[test]
 fn misprints_in_the_papers_fail() {
     let off = |measured: f64, printed: f64| printed / measured;
-    // Lloyd et al. Eqs. 2 and 9 lose a factor n, which shows at n = 2.
+    // Lloyd et al. Eqs. 2 and 9 lose a factor n, which is noticeable at n = 2.
     let (n, f, lambda) = (2.0, 200.0, 30.0);
     let wide = camera(n, f);
     let map = &plan_view(&wide, std::f64::consts::FRAC_PI_2, Warp::Lambda(lambda)).maps[0];
@@ -272,7 +273,7 @@ fn misprints_in_the_papers_fail() {
     let measured = 7.0 * wide.pixel_width_per_depth();
     assert_close(off(measured, printed), 1.0 / n, 1e-9, "w_i as printed is 1/n of a pixel's width");
 
-    // Zhang et al., appendix: tan φ_w of the first branch cuts corners off, F_p is too large.
+    // Zhang et al., appendix: tan φ_w for θ > φ cuts off corners, and F_p is too large.
     let camera = camera(N, F);
     let lambda = 11.0;
     let to_m = [0, 1].map(|i| f64::from(IMAGE) / 2.0 / f64::from(RES[i]));

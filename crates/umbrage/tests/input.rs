@@ -1,4 +1,4 @@
-//! Bad input gets an error that names the field; odd input gets a correct plan.
+//! Invalid input gives an error that names the field; unusual input gives a correct plan.
 
 mod common;
 
@@ -70,7 +70,7 @@ fn cameras_name_what_is_wrong() {
 fn lights_and_bounds_name_what_is_wrong() {
     let camera = Camera::look_at(VIEW).unwrap();
     let plan = |light: Light, bounds: &Bounds| {
-        // The first light is fine.
+        // The first light is valid.
         field(planner().plan(&camera, &[SUN, light], bounds, &Technique::default()))
     };
     let none = Bounds::default();
@@ -165,14 +165,14 @@ fn techniques_name_what_is_wrong() {
         (pcss(LightSize::Degrees(91.0)), "filter.light"),
     ];
     for (technique, expected) in cases {
-        let result = planner().plan(&camera, &[SUN], &Bounds::default(), &technique).cloned();
+        let result = Planner::new().plan(&camera, &[SUN], &Bounds::default(), &technique).cloned();
         assert_eq!(field(result), expected, "{technique:?}");
         // No light, no excuse.
-        let result = planner().plan(&camera, &[], &Bounds::default(), &technique).cloned();
+        let result = Planner::new().plan(&camera, &[], &Bounds::default(), &technique).cloned();
         assert_eq!(field(result), expected, "{technique:?}");
     }
     // What is not used may be anything.
-    planner().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
+    Planner::new().plan(&camera, &[SUN], &Bounds::default(), &at(&[1.0, 2.0, 4.0])).unwrap();
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn limits_name_what_is_wrong() {
     assert_eq!(plan(limits(1, 1), &technique(STABLE)), "technique.size");
 }
 
-/// A sun's size is an angle, a lamp's a length; what does not go together is an error, not a guess.
+/// A sun's size is an angle and a lamp's size a length; a mismatch is an error.
 #[test]
 fn lights_sizes_are_of_the_lights_kind() {
     let camera = Camera::look_at(VIEW).unwrap();
@@ -235,9 +235,10 @@ fn no_lights_need_no_maps() {
     }
 }
 
-/// Lights along the view, from behind and in front, lamps on the eye and at its corners, up along the view,
-/// narrow and huge ranges, all kinds of partitions, one-texel budgets, flat and point-like worlds: every
-/// plan is finite and within its budget, or the error says what cannot be had.
+/// Extreme configurations: lights along the view, from behind and from the front, lamps at the eye
+/// and at its corners, up along the view, narrow and huge ranges, all kinds of partitions, budgets
+/// of one texel, flat and point-like worlds. Every plan is finite and within its budget, or the
+/// error says why there is none.
 #[test]
 fn odd_input_gives_sound_plans() {
     let view = (VIEW.target - VIEW.eye).normalize();
@@ -283,7 +284,7 @@ fn odd_input_gives_sound_plans() {
         Partition { splits: Splits::Fitted, overlap: 1.0, ..Partition::slices(3) },
         Partition { faces: Faces::SidesAndNear, ..Partition::slices(2) },
         Partition { faces: Faces::Sides, splits: Splits::Practical(0.0), ..Partition::slices(3) },
-        // All before the near plane, and all beyond the far plane.
+        // Receivers in front of the near plane, and receivers beyond the far plane.
         Partition { splits: at(1e-12), overlap: 0.5, ..Partition::slices(4) },
         Partition { splits: at(9e11), faces: Faces::Sides, ..Partition::slices(4) },
     ];
@@ -295,7 +296,7 @@ fn odd_input_gives_sound_plans() {
         Size::MaxError(1e6),
     ];
     let mut planner = planner();
-    // Every pair of a partition and a size in turn, for each warp.
+    // For each warp all pairs of a partition and a size are tried in turn.
     let mut turn = 0;
     for look in views {
         let camera = Camera::look_at(look).unwrap();
@@ -378,7 +379,7 @@ fn a_camera_that_sees_nothing_gets_an_empty_plan() {
     }
 }
 
-/// A camera from matrices is the camera from eye and target, whatever the matrices' conventions.
+/// A camera from matrices equals the camera from eye and target, in every convention of matrices.
 #[test]
 fn cameras_from_any_engines_matrices() {
     let expected = Camera::look_at(VIEW).unwrap();
@@ -443,7 +444,7 @@ fn cameras_from_any_engines_matrices() {
     assert_eq!(field(bad), "camera.world_from_view");
 }
 
-/// An off-centre projection (one eye of a headset, say) sees what its matrix says.
+/// An off-centre projection (for one eye of a headset, say) shows what its matrix shows.
 #[test]
 fn off_centre_cameras() {
     let matrix = DMat4::from_cols(
@@ -466,7 +467,7 @@ fn off_centre_cameras() {
     }
 }
 
-/// Landmarks of the picture and of the map: where corners and centres go.
+/// Positions of corners and centres in the image and in the map.
 #[test]
 fn landmarks() {
     let camera = Camera::look_at(VIEW).unwrap();
@@ -478,8 +479,8 @@ fn landmarks() {
     let above = camera.pixel(VIEW.target + camera.up()).unwrap();
     assert!(above.y < 239.0 && (above.x - 320.0).abs() < 1e-9);
 
-    // Overhead sun: the near end of the view lies at t = 0, the far end at t = 1, right at large s, and
-    // what is higher is nearer the light.
+    // With the sun overhead, the near end of the view lies at t = 0, the far end at t = 1, the
+    // right side at large s, and higher points at smaller depths.
     let level = LookAt { eye: DVec3::ZERO, target: DVec3::NEG_Z, ..VIEW };
     let camera = Camera::look_at(level).unwrap();
     let light = Light::Directional { direction: DVec3::NEG_Y };
@@ -488,7 +489,7 @@ fn landmarks() {
         let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique(spread)).unwrap();
         let map = &plan.maps[0];
         let at = |x: f64, y: f64, z: f64| map.project(DVec3::new(x, y, z)).unwrap();
-        // Maps over other than what is seen do not follow the view.
+        // Maps that do not cover what is seen do not follow the view.
         if spread.cover == Cover::Seen {
             assert!(at(0.0, 0.0, -0.1).y.abs() < 1e-9, "{name}: near");
             assert!((at(0.0, 0.0, -100.0).y - 1.0).abs() < 1e-9, "{name}: far");
@@ -505,8 +506,8 @@ fn landmarks() {
     }
 }
 
-/// Culling planes let through what stands between the view and the light, and nothing beside, below or
-/// behind it.
+/// Caster planes keep what stands between the view and the light, and cull what stands beside,
+/// below or behind it.
 #[test]
 fn casters_are_culled() {
     let level = LookAt { eye: DVec3::ZERO, target: DVec3::NEG_Z, ..VIEW };
@@ -540,8 +541,8 @@ fn casters_are_culled() {
     }
 }
 
-/// What single precision takes away near the eye stays far below a texel, 100 km from the world's
-/// origin too.
+/// The error of single precision near the eye is far below a texel, also 100 km from the world's
+/// origin.
 #[test]
 fn single_precision_is_enough_far_from_the_origin() {
     let far_away = DVec3::new(1e5, 0.0, -1e5);

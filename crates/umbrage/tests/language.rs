@@ -1,4 +1,5 @@
-//! The language of techniques: what parses, what prints, and what is said of what does not parse.
+//! The language of techniques: which texts parse, how techniques print, and the errors of invalid
+//! texts.
 
 use proptest::prelude::*;
 use umbrage::language::{self, FILTERS, PARTITIONS, SIZES, WARPS, Word};
@@ -59,7 +60,7 @@ fn defaults_are_one_adaptive_hard_map_of_a_million_texels() {
     else {
         panic!("our sun")
     };
-    // The series' ringing is hidden unless the user says otherwise.
+    // By default a leak threshold hides the series' ringing.
     for (text, leak) in [("csm4", 0.1), ("csm4(offset)", 0.05), ("csm4(leak=0)", 0.0)] {
         let Filter::Prefiltered(Prefilter { statistic: Statistic::Csm(csm), .. }) =
             text.parse().unwrap()
@@ -70,8 +71,8 @@ fn defaults_are_one_adaptive_hard_map_of_a_million_texels() {
     }
 }
 
-/// Every word of the tables with each of its options parses, prints as it was written, is explained and
-/// stands in the help.
+/// Every word of the tables, with each of its options, parses, prints as it was written, is
+/// explained and is part of the help.
 #[test]
 fn the_tables_are_what_is_parsed_and_printed() {
     let help = language::help();
@@ -92,7 +93,7 @@ fn the_tables_are_what_is_parsed_and_printed() {
                 let technique = parsed(&text);
                 let printed = technique.to_string();
                 assert_eq!(parsed(&printed), technique, "{text}: {printed}");
-                // What is so by default is not printed.
+                // Default values are not printed.
                 let is_default = ["uniform:hard", "uniform:csm4(scale)"].contains(&text.as_str());
                 assert!(printed == text || is_default, "{text}: {printed}");
                 let explained = language::explain(&text);
@@ -195,7 +196,7 @@ fn bad_techniques_say_what_would_be_right() {
     }
 }
 
-/// A filter where the warp belongs, and cascades by the names that others give them.
+/// A filter in the place of the warp, and cascades under other common names.
 #[test]
 fn words_in_the_wrong_place_are_understood() {
     for (text, meant) in [
@@ -221,7 +222,7 @@ fn words_in_the_wrong_place_are_understood() {
     assert!(of("uniform:csm").contains("`uniform+z4`"), "{}", of("uniform:csm"));
 }
 
-/// What a planner refuses names the part of the text that is to blame.
+/// An error of the planner names the part of the text that causes it.
 #[test]
 fn complaints_are_about_a_part_of_the_text() {
     let technique = parsed("tsm(focus=3)+z4(fitted)+face:pcf3@64x32");
@@ -241,8 +242,8 @@ fn complaints_are_about_a_part_of_the_text() {
     }
 }
 
-/// The code that reports show is code: each of these compiles, is what the text parses to, and is what
-/// `rust_code` writes.
+/// The code that reports show is valid: each of these expressions compiles, equals what the text
+/// parses to, and is what `rust_code` writes.
 #[test]
 fn rust_code_makes_the_technique() -> Result<(), umbrage::Error> {
     let squeezed = |code: &str| code.split_whitespace().collect::<String>();
@@ -252,7 +253,7 @@ fn rust_code_makes_the_technique() -> Result<(), umbrage::Error> {
             assert_eq!(parsed($text), technique, $text);
             let code = parsed($text).rust_code();
             let value = code.split_once("let technique = ").unwrap().1.trim_end();
-            // Trailing commas are a matter of layout.
+            // Trailing commas depend on the layout only.
             let plain = |code: &str| squeezed(code).replace(",}", "}").replace(",)", ")");
             assert_eq!(plain(value), plain(concat!(stringify!($($code)*), ";")), "{code}");
             let uses = code.lines().filter(|l| l.starts_with("use umbrage")).count();

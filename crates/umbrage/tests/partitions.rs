@@ -24,8 +24,8 @@ fn reference_view() -> Camera {
     .unwrap()
 }
 
-/// Light whose way makes an angle of `theta` with the reference view, turned about it by `azimuth`,
-/// degrees; 90, 0 is overhead.
+/// Light whose direction makes an angle of `theta` with the reference view and is turned about it
+/// by `azimuth`, both in degrees; 90, 0 is overhead.
 fn sun(theta: f64, azimuth: f64) -> Light {
     let (sin, cos) = theta.to_radians().sin_cos();
     let (across, down) = azimuth.to_radians().sin_cos();
@@ -57,7 +57,7 @@ fn storage_factors_of_the_paper() {
         ),
         ("ZP+W overhead", OVERHEAD, Warp::Lispsm, Faces::Whole, [865.16, 53.04, 16.02, 9.50, 7.48]),
         ("ZP behind", BEHIND, Warp::Uniform, Faces::Whole, [1e6, 2000.0, 126.49, 44.99, 37.94]),
-        // Nothing to warp.
+        // Light along the view leaves nothing to warp.
         ("ZP+W behind", BEHIND, Warp::Lispsm, Faces::Whole, [1e6, 2000.0, 126.49, 44.99, 37.94]),
         (
             "FP+ZP+W behind",
@@ -74,11 +74,11 @@ fn storage_factors_of_the_paper() {
         }
     }
     for k in [1, 2, 4, 8, 16] {
-        // Faces bring nothing where the light sees one of them only.
+        // Faces change nothing if the light sees only one of them.
         let whole = storage(planner, OVERHEAD, Warp::Lispsm, k, Faces::Whole);
         let faces = storage(planner, OVERHEAD, Warp::Lispsm, k, Faces::SidesAndNear);
         assert!((faces / whole - 1.0).abs() < 1e-3, "k = {k}: {faces}, not {whole}");
-        // The near face can be left out at little cost.
+        // Leaving out the near face costs little.
         let sides = storage(planner, BEHIND, Warp::Lispsm, k, Faces::Sides);
         let with_near = storage(planner, BEHIND, Warp::Lispsm, k, Faces::SidesAndNear);
         assert!((1.0..1.5).contains(&(sides / with_near)), "k = {k}: {sides} of {with_near}");
@@ -102,7 +102,7 @@ fn no_light_direction_is_much_worse_than_light_from_behind() {
             let mut at =
                 |theta, azimuth| storage(&mut planner, sun(theta, azimuth), warp, k, faces);
             let behind = at(0.0, 0.0);
-            // A square view is symmetric eight times over.
+            // A square view has eight symmetries.
             let directions = (0..180).flat_map(|i| (0..6).map(move |j| (i, j)));
             let worst = directions
                 .map(|(i, j)| (f64::from(i) + 0.25, f64::from(j) * 9.0))
@@ -112,8 +112,8 @@ fn no_light_direction_is_much_worse_than_light_from_behind() {
                 "{name}, k = {k}: {behind:.2} behind, {worst:.2} at worst: {:.2}",
                 worst / behind
             );
-            // Light space perspective shadow maps as published warp too much where the light tilts
-            // towards the view, and a single map has a lot to lose.
+            // Light space perspective shadow maps as published warp too strongly where the light
+            // tilts towards the view, and a single map suffers most.
             let limit =
                 if (warp, faces, k) == (Warp::Lispsm, Faces::Whole, 1) { 13.0 } else { 3.0 };
             assert!(worst < limit * behind, "{name}, k = {k}: {worst} of {behind}");
@@ -121,8 +121,8 @@ fn no_light_direction_is_much_worse_than_light_from_behind() {
     }
 }
 
-/// Where the ray from `local` by `towards` leaves the view, by which of its faces: distance in
-/// lengths of `towards`, nearest first.
+/// Where the ray from `local` along `towards` leaves the view and through which of its faces:
+/// distances in multiples of `towards`, nearest first.
 fn exits(config: &Config, local: DVec3, towards: DVec3, faces: &[Face]) -> Vec<(f64, Face)> {
     let order = [Face::Top, Face::Right, Face::Bottom, Face::Left, Face::Near];
     let mut exits: Vec<(f64, Face)> = order
@@ -138,8 +138,8 @@ fn exits(config: &Config, local: DVec3, towards: DVec3, faces: &[Face]) -> Vec<(
     exits
 }
 
-/// Lights along the view, across it, along its edges and in the planes of its faces; lamps inside the
-/// view, on the eye, between eye and near plane, and everywhere else.
+/// Lights along the view, across it, along its edges and in the planes of its faces; lamps inside
+/// the view, at the eye, between the eye and the near plane, and everywhere else.
 fn awkward_lights(camera: &Camera, random: DVec3, place: [f64; 3]) -> Vec<(bool, DVec3)> {
     let [w, h] = camera.image().map(f64::from);
     let [a, b, c, d] =
@@ -191,9 +191,10 @@ fn awkward_lights(camera: &Camera, random: DVec3, place: [f64; 3]) -> Vec<(bool,
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Every point of the view is in one cell of the partition by faces, or on the border of several:
-    /// the face by which the ray towards the light (if it comes from behind, else away from it) leaves
-    /// the view, and there the slice where it leaves.
+    /// Every point of the view is in one cell of a partition by faces, or on the border of several.
+    /// The cell belongs to the face through which the ray towards the light (if it comes from
+    /// behind, otherwise the ray away from it) leaves the view, and to the slice at the place where
+    /// it leaves.
     #[test]
     fn every_point_is_in_the_cell_of_its_face(
         camera in camera(),
@@ -204,7 +205,7 @@ proptest! {
         with_near: bool,
     ) {
         use Face::{Bottom, Left, Near, Right, Top};
-        // World coordinates far away have no digits left for what is tested here.
+        // World coordinates far from the origin have too few digits for this test.
         prop_assume!(camera.eye().length() < 1e3 * camera.near());
         let faces = if with_near { Faces::SidesAndNear } else { Faces::Sides };
         let technique = Technique {
@@ -222,7 +223,8 @@ proptest! {
             let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique).unwrap();
             let config = Config { camera, light, bounds: Bounds::default() };
             let along_view = camera.forward().dot(l);
-            // The near face is a front face of lamps behind the eye and a back face of those beyond it.
+            // The near face is a front face for lamps behind the eye, and a back face for lamps
+            // beyond the near plane.
             let is_between = is_lamp && along_view < camera.near();
             let candidates = |is_front: bool| -> &[Face] {
                 let sees_near = with_near && (is_front || !is_between);
@@ -244,7 +246,7 @@ proptest! {
                 let sure = maps.iter().filter(|m| inside(m)).count();
                 prop_assert!(sure <= 1, "{sure} maps serve {what}");
 
-                // Exactly across the view front faces are as good as back faces.
+                // If the light shines exactly across the view, front and back faces are equivalent.
                 let (front, back) = (along_view < 1e-9 * l.length(), along_view > -1e-9 * l.length());
                 let part = maps[0].part;
                 let ways = [(front, true, to_light), (back, false, -to_light)];
@@ -275,7 +277,8 @@ proptest! {
         }
     }
 
-    /// Slices meet where the schemes' formulas say, n and f being those of the receivers seen.
+    /// Slices meet where the schemes' formulas place them, where n and f are those of the receivers
+    /// seen.
     #[test]
     fn slices_meet_where_they_should(
         config in config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. })),
@@ -296,7 +299,7 @@ proptest! {
             let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique).unwrap();
             let found: Vec<_> = plan.maps.iter().map(|m| m.split).collect();
             let ([first, _], [_, last]) = (found[0], found[found.len() - 1]);
-            // Bounds that are flat were widened a little, and a view along them sees much of it.
+            // Flat bounds are thickened a little, of which a view along them sees much.
             assert!((first - n).abs().max((last - f).abs()) <= 1e-4 * f, "{found:?}, not {n}..{f}");
             for (i, pair) in found.windows(2).enumerate() {
                 let expected = end(first, last, (i + 1) as f64 / f64::from(slices), i);
@@ -315,8 +318,8 @@ proptest! {
         expect(Splits::At(at), &|_, _, _, i| at[i]);
     }
 
-    /// Fitted slices need the same number of texels for the same error. (More than eight can crowd where a
-    /// slice as thin as rounding needs as much as a thick one.)
+    /// Fitted slices need the same number of texels for the same error. (Partitions into more than
+    /// eight can have slices as thin as rounding, which need as many texels as thick ones.)
     #[test]
     fn fitted_slices_need_the_same(
         config in config().prop_filter("parallel light", |c| matches!(c.light, Light::Directional { .. })),
@@ -331,7 +334,7 @@ proptest! {
             for maps in plan.maps.chunks(slices as usize) {
                 let storages = maps.iter().map(|m| m.storage_factor).filter(|&s| s > 0.0);
                 let (lo, hi) = storages.fold((f64::INFINITY, 0f64), |(lo, hi), s| (lo.min(s), hi.max(s)));
-                // The least error of `adaptive` has two valleys now and then, and jumps between them.
+                // The error of `adaptive` sometimes has two minima, and λ jumps between them.
                 let alike = if warp == ADAPTIVE { 1.2 } else { 1.01 };
                 prop_assert!(
                     hi <= lo * alike || hi == 0.0,
@@ -344,7 +347,8 @@ proptest! {
     }
 }
 
-/// A lamp in the eye itself casts no shadow that is seen: only the near face is before it.
+/// A lamp at the eye itself casts no shadow that the camera sees. Only the near face lies in front
+/// of it.
 #[test]
 fn a_lamp_in_the_eye() {
     let camera = reference_view();

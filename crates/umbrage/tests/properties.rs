@@ -1,4 +1,4 @@
-//! What must hold of every plan, over random cameras, lights and bounds.
+//! Properties of every plan, over random cameras, lights and bounds.
 
 mod common;
 
@@ -13,8 +13,8 @@ fn numbers() -> impl Strategy<Value = Vec<[f64; 3]>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Every receiver lands in the map; its casters share its texel, lie nearer the light and are not
-    /// culled; no point's error exceeds the reported maximum.
+    /// Every receiver lands in its map; its casters share its texel, lie nearer the light and are
+    /// not culled; and no point's error exceeds the reported maximum.
     #[test]
     fn receivers_casters_and_errors(
         config in config(),
@@ -35,7 +35,7 @@ proptest! {
         }
         let seen = config.seen_points(&numbers);
         prop_assert!(plan.texels() <= 1 << 20);
-        // World coordinates carry rounding of their own, worth this much of the scene.
+        // The rounding of world coordinates, as a share of the scene's size.
         let rounding = config.camera.eye().abs().max_element() * 1e-15;
         let answers = seen.into_iter().flat_map(|p| {
             let shares: f64 = plan.lookup(0, p).map(|(_, share)| share).sum();
@@ -50,7 +50,7 @@ proptest! {
             };
             let error = map.perspective_error(&config.camera, p).unwrap();
             let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
-            // Rounding in texels, from its size in metres and the texel's size in metres.
+            // Rounding in texels: its size in metres over a texel's width.
             let slack_s = 1e-7 + rounding / (error.s * pixel * res_s);
             let slack_t = 1e-7 + rounding / (error.t * pixel * res_t);
             prop_assert!((-slack_s..=1.0 + slack_s).contains(&shadow.x), "{name}: s = {}", shadow.x);
@@ -72,7 +72,7 @@ proptest! {
             let Some(casts) = map.project(caster) else {
                 return Err(TestCaseError::fail(format!("{name}: no caster at {caster}, {map:?}")));
             };
-            // A spot light's texels are up to ten times as narrow at the caster.
+            // Under a spot light, texels are up to ten times narrower at the caster.
             let metres = 1e-14 * (config.camera.eye().length() + reach);
             let [texel_s, texel_t] = [error.s, error.t].map(|e| 1e-4 + metres / (e * pixel));
             prop_assert!(((casts - shadow).x * res_s).abs() < texel_s, "{name}: {casts} from {shadow}");
@@ -87,7 +87,7 @@ proptest! {
         }
     }
 
-    /// `adaptive` needs no more texels than `uniform` for the same error, however little warping helps.
+    /// `adaptive` never needs more texels than `uniform` for the same error.
     #[test]
     fn uniform_needs_at_least_adaptive(config in config()) {
         let mut planner = planner();
@@ -97,13 +97,13 @@ proptest! {
         };
         let uniform = storage(Warp::Uniform);
         let adaptive = storage(Warp::Adaptive(Objective::Storage));
-        // The reported maxima under spot lights are known to one per cent each.
+        // Under spot lights each reported maximum is known to one per cent.
         prop_assert!(adaptive <= uniform * 1.021, "{adaptive} > {uniform}");
     }
 }
 
-/// The reported maxima are reached to 2%: they are compared with the errors at the body's corners and
-/// along its edges, found by brute force from all triples and pairs of its planes.
+/// The reported maxima are reached to 2%, compared with the errors at the body's corners and along
+/// its edges, which brute force finds from all triples and pairs of its planes.
 #[test]
 fn maxima_are_reached() {
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
@@ -129,7 +129,8 @@ fn maxima_are_reached() {
                 for (i, a) in corners.iter().enumerate() {
                     for b in &corners[..=i] {
                         for k in 0..=40 {
-                            // Evenly in the picture: the share of b grows with 1/z.
+                            // The points are spread evenly in the image, so the share of b grows
+                            // with 1/z.
                             let k = f64::from(k) / 40.0;
                             let (to_a, to_b) = ((1.0 - k) * b.dot(forward), k * a.dot(forward));
                             let p = config.camera.eye() + a.lerp(*b, to_b / (to_a + to_b));

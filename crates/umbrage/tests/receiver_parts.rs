@@ -1,4 +1,5 @@
-//! Receivers as many boxes: all in them is served, and what none of them holds costs nothing.
+//! Receivers given as many boxes: all receivers in them are served, and the space between them
+//! costs no texels.
 
 mod common;
 
@@ -7,8 +8,9 @@ use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{Aabb, Bounds, Faces, Light, Partition, Plan, Splits, Technique, Warp};
 
-/// Some boxes among a configuration's receivers, or in its view where there are none: some flat, some
-/// empty, some twice, some out of sight. They are given by numbers, for any configuration.
+/// Boxes among a configuration's receivers, or in its view if it has none. Some are flat, some
+/// empty, some repeated and some out of sight. They are described by numbers that apply to any
+/// configuration.
 fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
     let unit = || prop::array::uniform3(0.0..=1.0f64);
     let within = (unit(), unit(), 0.0..=1.0f64, 0usize..6)
@@ -24,7 +26,8 @@ fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
 
 #[derive(Clone, Debug)]
 enum PartialBox {
-    /// From a towards b, `size` of the way; without thickness along an axis if `flat` names one.
+    /// From a towards b, by the share `size` of the way; flat along the axis that `flat` names, if
+    /// any.
     Within {
         a: [f64; 3],
         b: [f64; 3],
@@ -86,8 +89,8 @@ fn cases(cases: u32) -> ProptestConfig {
 proptest! {
     #![proptest_config(cases(5000))]
 
-    /// Every point of a part that is seen is served, by maps whose errors there are no larger than they
-    /// say, and into which its casters are drawn.
+    /// Every visible point of a part is served by maps whose errors there do not exceed the
+    /// reported ones, and whose caster planes keep the point's casters.
     #[test]
     fn all_parts_are_served(
         config in config(),
@@ -106,7 +109,7 @@ proptest! {
             prop_assert!(map.shadow_from_local.is_finite() && map.local_from_shadow.is_finite());
             prop_assert!(errors.iter().all(|e| e.is_finite()) && map.storage_factor.is_finite());
         }
-        // World coordinates carry rounding of their own, worth this much of the scene.
+        // The rounding of world coordinates, as a share of the scene's size.
         let rounding = config.camera.eye().abs().max_element() * 1e-15;
         for p in seen_points(&config, &parts, &numbers) {
             let answers: Vec<(usize, f64)> = plan.lookup(0, p).collect();
@@ -119,7 +122,7 @@ proptest! {
                 };
                 let error = map.perspective_error(&config.camera, p).unwrap();
                 let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
-                // Rounding in shadow coordinates, from its size in metres and the texel's.
+                // Rounding in shadow coordinates: its size in metres relative to a texel's.
                 let [slack_s, slack_t] = [(error.s, 0), (error.t, 1)].map(|(texel, axis)| {
                     1e-7 + rounding / (texel * pixel * f64::from(map.resolution[axis]))
                 });
@@ -141,8 +144,8 @@ proptest! {
         }
     }
 
-    /// An even map of the parts costs no more texels than one of a box around them all, for the same
-    /// error: it is no larger, and nothing in it nearer to the viewer.
+    /// An even map of the parts needs no more texels than one of a box around them for the same
+    /// error, because it is no larger and its receivers are no nearer to the viewer.
     #[test]
     fn parts_cost_no_more_than_a_box_around_them(
         config in under_a_sun(),
@@ -158,8 +161,8 @@ proptest! {
         prop_assert!(many <= one * 1.01, "{many} > {one}");
     }
 
-    /// A part that holds all that is seen changes nothing. (Under lamps the largest errors are upper
-    /// bounds, whose slack depends on where their search begins.)
+    /// A part that contains everything seen changes nothing. (Under lamps the largest errors are
+    /// upper bounds, whose slack depends on where the search begins.)
     #[test]
     fn a_part_around_everything_changes_nothing(
         config in under_a_sun(),
@@ -168,26 +171,26 @@ proptest! {
         larger in prop_oneof![Just(0.0), Just(10.0), Just(1e9)],
     ) {
         let (name, spread) = WARPS[pick];
-        // Rounding decides where a search for fitted slices ends, and the range on a face where light and
-        // view nearly agree.
+        // Rounding determines where the search for fitted slices ends, and the range along a face
+        // where the light direction is close to the view direction.
         prop_assume!(partition.splits != Splits::Fitted);
         let partition = Partition { faces: Faces::Whole, ..possible(partition, spread) };
         let technique = Technique { partition, ..technique(spread) };
         let far = config.camera.far();
         let around_view = Aabb::new(config.camera.eye() - 9.0 * far, config.camera.eye() + 9.0 * far);
         let all = config.bounds.receivers.unwrap_or(around_view);
-        // Boxes without thickness get one that depends on what else there is.
+        // Flat boxes are given a thickness that depends on the size of what is seen.
         let is_flat = all.size().min_element() == 0.0;
         let larger = if is_flat { f64::max(larger, 1.0) } else { larger };
         let part = [Aabb { min: all.min - larger, max: all.max + larger }];
         let expected = plan(&config, &config.bounds, &technique);
         let found = plan(&config, &Bounds { receiver_parts: &part, ..config.bounds }, &technique);
         let tolerance = match spread.warp {
-            // Its strength is somewhere on a valley's flat bottom.
+            // The strength may lie anywhere near the minimum, which is flat.
             Warp::Adaptive(_) => 1e-5,
-            // Multiplies roundings where near and far hardly differ.
+            // The perspective amplifies rounding where near and far distances hardly differ.
             Warp::Psm => 1e-3,
-            // Of hardly any thickness is made what rounding leaves of it.
+            // The map of a nearly flat body depends on rounding.
             _ if all.size().min_element() < 1e-3 * all.size().max_element() => 1e-6,
             _ => 1e-9,
         };

@@ -1,4 +1,4 @@
-//! How texels are shared out: budgets by error, sizes by error, what devices allow.
+//! Distribution of texels: budgets by error, sizes by error, and the limits of devices.
 
 mod common;
 
@@ -42,15 +42,15 @@ fn maps(plan: &Plan) -> impl Iterator<Item = &ShadowMap> {
     plan.maps.iter().filter(|m| !m.is_empty())
 }
 
-/// Least and largest of the errors in s and t over all sides that are neither cut nor too short to be
-/// divided finely.
+/// The least and the largest error in s and t, over all sides that are neither clamped nor too
+/// short to be divided finely.
 fn spread(plan: &Plan, max_side: u32, least: u32) -> (f64, f64) {
     let of_map = |m: &ShadowMap| {
         let [s, t] = m.resolution;
         [(s, m.error.max_s), (t, m.error.max_t)]
     };
     maps(plan)
-        // What is cut on one side is not free on the other.
+        // If one side is clamped, the other one depends on it.
         .filter(|m| m.resolution.iter().all(|n| (least..max_side).contains(n)))
         .flat_map(of_map)
         .fold((f64::INFINITY, 0f64), |(lo, hi), (_, e)| (lo.min(e), hi.max(e)))
@@ -59,7 +59,8 @@ fn spread(plan: &Plan, max_side: u32, least: u32) -> (f64, f64) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// All maps of all lights have the same largest error in s and in t, and a large budget is used.
+    /// All maps of all lights have the same largest error in s and in t, and the budget is used up
+    /// to rounding if it is large.
     #[test]
     fn a_budget_makes_all_errors_alike(
         (config, lights) in suns(),
@@ -71,14 +72,14 @@ proptest! {
         let technique = Technique { size: Size::Budget(budget), partition, ..technique(EXACT[pick]) };
         let plan = plan(&config, &lights, &technique);
         let (lo, hi) = spread(&plan, 1 << 16, 100);
-        // A texel more or less on a side of a hundred, and what that leaves to the other side.
+        // Rounding changes a side of a hundred texels by one, and with it the other side.
         prop_assert!(hi <= lo * 1.021 || hi == 0.0, "{lo} to {hi}");
         prop_assert!(plan.texels() <= budget);
         let all_long = maps(&plan).all(|m| m.resolution.iter().all(|n| (100..1 << 16).contains(n)));
         prop_assert!(!all_long || plan.texels() as f64 >= 0.98 * budget as f64, "{}", plan.texels());
     }
 
-    /// What a side must not have goes to the other side and to other maps; sides are aligned.
+    /// Texels saved on clamped sides go to the other side and to other maps; all sides are aligned.
     #[test]
     fn devices_limits_are_kept(
         (config, lights) in suns(),
@@ -101,13 +102,14 @@ proptest! {
         let step = 1.021 + 0.02 * f64::from(align - 1);
         prop_assert!(hi <= lo * step || hi == 0.0, "{lo} to {hi}");
         let all = maps(&plan).count() as u64 * u64::from(longest).pow(2);
-        // Short sides are rounded down a lot.
+        // Rounding shortens short sides by a large share.
         let all_long = maps(&plan).all(|m| m.resolution.iter().all(|&n| n >= 20 * align));
         let wanted = 0.9 * budget.min(all) as f64;
         prop_assert!(!all_long || plan.texels() as f64 >= wanted, "{} of {wanted}", plan.texels());
     }
 
-    /// A size by error keeps the error, and a fifth fewer texels, however they are shared, do not.
+    /// A size by error keeps to the error, and a fifth fewer texels do not, however they are
+    /// distributed.
     #[test]
     fn sizes_by_error_are_the_least(
         config in config(),
@@ -129,21 +131,21 @@ proptest! {
             Ok(by_error) => {
                 prop_assert!(largest(&by_error) <= wanted * (1.0 + 1e-9));
                 let is_fine = maps(&by_error).all(|m| m.resolution.iter().all(|&n| n >= 40));
-                // Stable maps are sized for the worst that they may ever see.
+                // Stable maps are sized for the largest error that any view can have.
                 if is_fine && spread != STABLE {
                     let fewer = with(Size::Budget((by_error.texels() as f64 * 0.8) as u64)).unwrap();
                     prop_assert!(largest(&fewer) > wanted, "{} of {wanted}", largest(&fewer));
                 }
             }
             Err(error) => {
-                // A side was cut.
+                // A side was clamped.
                 let is_cut = |m: &ShadowMap| m.resolution.iter().any(|&n| n > 20_000);
                 prop_assert!(spread == STABLE || maps(&by_budget).any(is_cut), "{error}");
             }
         }
     }
 
-    /// Plans depend on their input alone, to the last bit: not on what was planned before, nor on errors.
+    /// Plans depend on their input alone, to the last bit, and not on earlier plans or errors.
     #[test]
     fn planners_have_no_memory(
         (first, second) in (config(), config()),
@@ -164,11 +166,11 @@ proptest! {
         let broken = [second.light, Light::Directional { direction: DVec3::ZERO }];
         planner.plan(&second.camera, &broken, &second.bounds, &b).unwrap_err();
         let again = planner.plan(&first.camera, &[first.light], &first.bounds, &a).unwrap();
-        // Text tells −0 from 0.
+        // The comparison of texts distinguishes −0 from 0.
         prop_assert_eq!(format!("{again:?}"), format!("{fresh:?}"));
     }
 
-    /// Maps of several lights are those that each has alone, but for their resolution.
+    /// Maps of several lights equal those planned for each light alone, but for their resolution.
     #[test]
     fn lights_do_not_mix(
         camera in camera(),
@@ -205,7 +207,7 @@ fn view() -> Camera {
 
 const SUN: Light = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) };
 
-/// What cannot be had is an error of the size, and what just can be had is planned.
+/// Sizes that cannot be had give an error of the size, and sizes that just can be had are planned.
 #[test]
 fn sizes_that_cannot_be_had() {
     let lamp = Light::Point(PointLight { position: DVec3::ZERO, near: 0.1, range: 50.0 });
@@ -251,7 +253,8 @@ fn sizes_that_cannot_be_had() {
     }
 }
 
-/// Fitted slices do not change how many texels errors need by much: every map gets its even share.
+/// Fitted slices change the number of texels that an error needs by little, because each map gets
+/// an equal share.
 #[test]
 fn fitted_slices_share_evenly() {
     let partition = Partition { splits: Splits::Fitted, ..Partition::slices(4) };

@@ -1,7 +1,8 @@
-//! No pops: along smooth motions of camera and sun, the size of the texel in the map's middle is continuous.
+//! Along smooth motions of camera and sun, the size of the texel in the middle of each map changes
+//! continuously.
 //!
-//! Motions are sampled finely; where the size changes much from one sample to the next, the place of
-//! the largest change is bisected down to rounding. A jump survives that, a steep slope does not.
+//! Motions are sampled finely. Where the size changes much from one sample to the next, the place
+//! of the largest change is bisected down to rounding, which distinguishes jumps from steep slopes.
 
 mod common;
 
@@ -19,7 +20,7 @@ struct Frame {
     sun: DVec3,
 }
 
-/// Where sun and viewer are at time τ in [0, 1].
+/// The sun and the viewer at time τ in [0, 1].
 type Motion = (&'static str, fn(f64) -> Frame);
 
 const EYE: DVec3 = DVec3::new(0.0, 2.0, 10.0);
@@ -39,7 +40,7 @@ const MOTIONS: [Motion; 5] = [
             sun: DVec3::new(0.3, -0.6, 0.8),
         }
     }),
-    // From behind the viewer over his head to before him, passing the view at 3°.
+    // The sun moves from behind the viewer over the head to the front, and passes the view at 3°.
     ("sun", |t| {
         let (sin, cos) = (std::f64::consts::PI * t).sin_cos();
         Frame { eye: EYE, target: TARGET, sun: DVec3::new(0.06, -sin - 0.1, -cos) }
@@ -70,20 +71,20 @@ fn texels(plan: &Plan) -> Vec<Option<[f64; 2]>> {
     let texel = |map: &ShadowMap| {
         let middle = map.beam(DVec2::splat(0.5))?;
         let footprint = map.footprint(middle.origin)?;
-        // A slice may dwindle to nothing, smoothly; how fast the logarithm falls then is no matter.
+        // A slice may shrink smoothly to nothing, where the logarithm falls arbitrarily fast.
         Some([footprint.base(), footprint.height()].map(|metres| (metres + 1e-6).ln()))
     };
     plan.maps.iter().map(|m| if m.is_empty() { None } else { texel(m) }).collect()
 }
 
-/// Largest change of any map that both have.
+/// Largest change of any map that is not empty in both plans.
 fn change(a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>]) -> f64 {
     let both = a.iter().zip(b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     both.map(|(a, b)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs())).fold(0.0, f64::max)
 }
 
-/// The largest jump along a motion cut into `steps`: a change within 1e-9 of it, and where. Changes of
-/// less than a per cent are none.
+/// The largest jump along a motion cut into `steps`: the change within 1e-9 of a time, and that
+/// time. Changes of less than one per cent are ignored.
 fn largest_jump(steps: u32, mut at: impl FnMut(f64) -> Vec<Option<[f64; 2]>>) -> (f64, f64) {
     let mut largest = (0.0, 0.0);
     let mut before = at(0.0);
@@ -128,8 +129,8 @@ fn assert_smooth(steps: u32, partition: Partition, spreads: &[(&str, Spread)]) {
     for (motion, frame_at) in MOTIONS {
         for (bounds_name, bounds) in bounds() {
             for &(name, spread) in spreads {
-                // For thin slices of a floor the least error of `adaptive` has two valleys now and then,
-                // and the lower one changes.
+                // For thin slices of a floor the error of `adaptive` sometimes has two minima, and
+                // the lower one changes.
                 let is_thin = partition.slices > 1 && bounds_name == "floor";
                 if is_thin && matches!(spread.warp, Warp::Adaptive(_)) {
                     continue;
@@ -169,9 +170,9 @@ fn texels_of_fitted_slices_change_size_without_jumps() {
     assert_smooth(40, fitted, &warps.map(|warp| ("fitted", warp.into())));
 }
 
-/// Maps of faces change from front to back faces of the view where the light passes at right angles:
-/// the faces that serve are others, and so are texels. Nowhere else does a texel jump, whatever face turns
-/// edge-on.
+/// Where the light passes at right angles to the view, maps of faces change from the view's front
+/// faces to its back faces, and with the faces the texels change. Nowhere else does a texel's size
+/// jump, whichever face becomes edge-on.
 #[test]
 fn faces_jump_at_right_angles_only() {
     let camera = camera(&Frame { eye: EYE, target: TARGET, sun: DVec3::ZERO });
@@ -187,7 +188,7 @@ fn faces_jump_at_right_angles_only() {
                 }
                 let technique =
                     Technique { size: Size::Exact([1024; 2]), partition, ..technique(spread) };
-                // From behind over the head to the front, from 0 to 1.
+                // The light moves from behind over the head to the front, from 0 to 1.
                 let mut plan = |t: f64| {
                     let (sin, cos) = (std::f64::consts::PI * t).sin_cos();
                     let direction = forward * cos - up * sin + right * (side * sin);
@@ -249,10 +250,10 @@ fn moved(config: &Config, which: usize, step: DVec3, axis: DVec3) -> (Camera, Li
 proptest! {
     #![proptest_config(ProptestConfig { cases: 6000, max_global_rejects: 60_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Moving by a millionth of the near distance, or turning by a millionth of a radian, changes no
-    /// texel's width or height by more than two in a thousand.
-    /// But for maps of the whole view or its near face, where it misses the light's way by less than a
-    /// thousandth of a radian: they turn with the direction by which it does.
+    /// Moving by a millionth of the near distance, or turning by a millionth of a radian, changes
+    /// no texel's width or height by more than two in a thousand. Maps of the whole view or its
+    /// near face are excepted where the view misses the light direction by less than a thousandth
+    /// of a radian: they turn with the direction in which it does.
     #[test]
     fn small_motions_make_small_changes(
         config in config(),

@@ -1,5 +1,5 @@
-//! Stable maps stand still: whatever the camera does, every point of the world keeps its place among the
-//! texels but for whole texels.
+//! Stable maps: whatever the camera does, every point of the world keeps its position within the
+//! grid of texels; the map moves by whole texels only.
 
 mod common;
 
@@ -11,7 +11,7 @@ use umbrage::{
     Technique,
 };
 
-/// A camera but for where it is.
+/// A camera without its pose.
 #[derive(Clone, Copy, Debug)]
 struct Lens {
     fov_y_rad: f64,
@@ -35,8 +35,8 @@ struct Pose {
     up: DVec3,
 }
 
-/// Lenses of all kinds. Round numbers put bounding spheres on round radii, where rounding could tip them
-/// either way.
+/// Fields of view and depth ranges of all kinds. Round numbers give bounding spheres of round
+/// radii, which rounding could change in either direction.
 fn lens() -> impl Strategy<Value = Lens> {
     let images = || prop_oneof![Just([640, 480]), Just([1280, 720]), Just([512, 512])];
     let any = (20.0..110.0f64, 0.05..2.0f64, 5.0..2000.0f64, images());
@@ -74,7 +74,7 @@ fn partition() -> impl Strategy<Value = Partition> {
     let splits = prop_oneof![
         Just(Splits::SelfSimilar),
         (0.0..=1.0f64).prop_map(Splits::Practical),
-        // Some of them beyond the far distance.
+        // Some slices lie beyond the far distance.
         (0.2..50.0f64)
             .prop_map(|first| Splits::At(std::array::from_fn(|i| first * 3f64.powi(i as i32)))),
     ];
@@ -92,14 +92,14 @@ fn size() -> impl Strategy<Value = Size> {
     ]
 }
 
-/// Columns of the matrix that do not depend on where the world's origin is.
+/// Columns of the matrix that do not depend on the position of the world's origin.
 fn linear_part(map: &ShadowMap) -> [u64; 12] {
     let columns = [0, 1, 2].map(|i| map.shadow_from_local.col(i).to_array());
     std::array::from_fn(|i| columns.as_flattened()[i].to_bits())
 }
 
-/// What is known of a map from the first frame that has it, with places of points of the world in it:
-/// texels in s and t, and depth.
+/// A map as planned in the first frame in which it is not empty, with the positions of world points
+/// in it: texels in s and t, and depth.
 struct Reference {
     linear: [u64; 12],
     resolution: [u32; 2],
@@ -114,8 +114,8 @@ fn places(map: &ShadowMap, landmarks: &[DVec3]) -> Vec<Option<DVec3>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Under parallel light. What is left of a texel's fraction is the rounding of world coordinates:
-    /// 1e-10 metres a thousand kilometres from the origin.
+    /// Under parallel light, positions change by whole texels. The remaining difference is the
+    /// rounding of world coordinates: 1e-10 metres a thousand kilometres from the origin.
     #[test]
     fn points_move_by_whole_texels_under_the_sun(
         lens in lens(),
@@ -153,13 +153,13 @@ proptest! {
                 prop_assert_eq!(linear_part(map), known.linear);
                 let metres = [0, 1, 2].map(|i| map.shadow_from_local.row(i).truncate().length().recip());
                 let texel = [0, 1].map(|i| metres[i] / f64::from(map.resolution[i]));
-                // Depth, too, moves by whole widths of a texel.
+                // Depth, too, moves by whole texel widths.
                 let depth_step = texel[0] / metres[2];
                 for (a, b) in here.iter().zip(&known.places) {
                     let moved = a.unwrap() - b.unwrap();
                     let steps = moved / DVec3::new(1.0, 1.0, depth_step);
                     let off = (steps - steps.round()).abs();
-                    let slack = DVec3::new(texel[0], texel[1], texel[0]).map(|t| 1e-6 + rounding / t);
+                    let slack = 1e-6 + rounding / DVec3::new(texel[0], texel[1], texel[0]);
                     prop_assert!(off.cmple(slack).all(), "{steps}: off by {off}, not {slack}");
                 }
             }
@@ -176,7 +176,7 @@ proptest! {
         }
     }
 
-    /// Under lamps nothing moves at all, but for rounding of world coordinates.
+    /// Under lamps no position changes, but for the rounding of world coordinates.
     #[test]
     fn nothing_moves_under_lamps(
         lens in lens(),
@@ -188,7 +188,7 @@ proptest! {
         size in size(),
         numbers in proptest::collection::vec([0.0..1.0f64, 0.0..1.0, 0.0..1.0], 6),
     ) {
-        // A budget is shared among six sides and their slices.
+        // The budget is shared among six sides and their slices.
         let size = if size == Size::Budget(5000) { Size::Budget(50_000) } else { size };
         let technique = Technique { partition, size, ..technique(STABLE) };
         let (position, near, range) = (home + DVec3::from(at) * 30.0, 0.1, 100.0);
@@ -220,7 +220,7 @@ proptest! {
                 prop_assert_eq!(linear_part(map), known.linear);
                 for ((a, b), &p) in here.iter().zip(&known.places).zip(&landmarks) {
                     let (&Some(a), &Some(b)) = (a, b) else { continue };
-                    // Near the plane of the lamp itself images race off to infinity.
+                    // Near the plane of the lamp itself images tend to infinity.
                     let along = (p - position).dot(map.beam(glam::DVec2::splat(0.5)).unwrap().direction);
                     if along > near {
                         let slack = 1e-9 + rounding / along;
@@ -233,7 +233,8 @@ proptest! {
     }
 }
 
-/// Slices that lie beyond the view cost nothing; those that see nothing just now keep their texels.
+/// Slices beyond the view need no texels; slices within it keep their texels even if they see no
+/// receivers.
 #[test]
 fn slices_beyond_the_view_cost_nothing() {
     let lens = Lens { fov_y_rad: 1.0, near: 1.0, far: 100.0, image: [640, 480] };

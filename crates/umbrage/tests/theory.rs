@@ -52,12 +52,12 @@ fn views() -> impl Strategy<Value = View> {
     })
 }
 
-/// Angles over the whole range, right angles and angles of the view's own sides among them.
+/// Angles over the whole range, including right angles and the angles of the view's own sides.
 fn thetas() -> impl Strategy<Value = f64> {
     prop_oneof![6 => 0.0..=PI, 1 => Just(FRAC_PI_2), 1 => Just(0.0), 1 => 0.0..0.01f64]
 }
 
-/// Warps far too strong and far too weak, and none.
+/// Warps from far too strong to far too weak, and no warp.
 fn lambdas(view: View) -> impl Strategy<Value = f64> {
     let (n, f) = (view.near(), view.far());
     prop_oneof![
@@ -80,7 +80,8 @@ fn config(cases: u32) -> ProptestConfig {
 proptest! {
     #![proptest_config(config(1000))]
 
-    /// Theory §3.1 by dense sampling of V: nothing is outside the range, and its ends are reached.
+    /// Theory §3.1 against dense sampling of V: no error is outside the range, and both ends are
+    /// reached.
     #[test]
     fn extrema_are_those_of_a_dense_sampling(warped in any_warped()) {
         let view = warped.tilted().view();
@@ -102,8 +103,8 @@ proptest! {
             }
             let (lo, hi) = (extreme.least.value, extreme.largest.value);
             prop_assert!(lo <= least * (1.0 + 1e-9) && hi >= largest * (1.0 - 1e-9), "{lo} {least} {largest} {hi}");
-            // Largest errors are at sampled corners; the smallest may lie between samples, whose steps in z
-            // are at most 17%, where a flat minimum changes by less than 3%.
+            // The largest errors are at sampled corners. The smallest may lie between samples,
+            // whose steps in z are 17% at most, over which a flat minimum changes by less than 3%.
             prop_assert!(hi <= largest * (1.0 + 1e-9) && lo >= least * 0.97, "{lo} {least} {largest} {hi}");
             for end in [extreme.least, extreme.largest] {
                 let there = error(warped.errors(end.y, end.z).unwrap());
@@ -186,17 +187,17 @@ fn optima_of_the_reference_table() {
         let gain = tilted.adaptive_gain(Rule::Lispsm).unwrap();
         close(gain, lispsm[0] / storage, 1e-2, &what("the gain over LiSPSM"));
         for (cost, expected) in costs(AREA).into_iter().zip(area) {
-            // The reference's λ came from a coarser search.
+            // The reference λ came from a coarser search.
             close(cost, expected, 1.2e-2, &what("adaptive(area)"));
         }
     }
 }
 
-/// Theory's W built from nothing but the frustum's corners and the light, and its map (Eq. 12).
+/// Theory's W, constructed from only the frustum's corners and the light, and its map (Eq. 12).
 struct Measured {
     sin: f64,
     cos: f64,
-    /// Along W's axis, of V's nearest point.
+    /// Position along W's axis of V's nearest point.
     nearest: f64,
     lambda: f64,
     mu: f64,
@@ -227,14 +228,15 @@ impl Measured {
         z * self.sin - y * self.cos - self.nearest + self.lambda
     }
 
-    /// Across and along the map, less 1/2 and (λ + μ)/μ: constants that would cost differences their digits.
+    /// The map's coordinates across and along its axis, without the constants 1/2 and (λ + μ)/μ,
+    /// which would cost numerical differences their digits.
     fn map(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let z_w = self.z_w(y, z);
         let along = -(self.lambda + self.mu) / self.mu * (self.lambda / z_w);
         [x / (2.0 * z_w * self.tan_phi_w), along]
     }
 
-    /// (q, p).
+    /// The image's coordinates (q, p).
     fn image(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         [x / (z * self.tan_phi), y / (z * self.tan_phi)]
     }
@@ -243,8 +245,8 @@ impl Measured {
 proptest! {
     #![proptest_config(config(4000))]
 
-    /// E^pers·E^proj against (q, p) and Eq. 12 differentiated numerically along a random slope, at a random
-    /// point of V.
+    /// E^pers·E^proj against numerical derivatives of (q, p) and Eq. 12 along a random slope, at a
+    /// random point of V.
     #[test]
     fn errors_are_the_derivatives_of_the_map(
         view in views(),
@@ -265,12 +267,12 @@ proptest! {
         prop_assert!((warped.z_w(y, z) / found - 1.0).abs() < 1e-6);
         let errors = warped.errors(y, z).unwrap();
         let projection = warped.projection([x, y, z], slope).unwrap();
-        // E = F (z + G)^i/z.
+        // E = F (z + G)^i/z, with i = 1 for q and 2 for p.
         let from_g = z + warped.g(y);
         prop_assert!((warped.f_q() * from_g / z / errors.q - 1.0).abs() < 1e-6);
         prop_assert!((warped.f_p() * from_g * from_g / z / errors.p - 1.0).abs() < 1e-6);
 
-        // Central differences, at two steps for Richardson's extrapolation.
+        // Central differences at two steps, for Richardson's extrapolation.
         let derivative = |step: f64, of: &dyn Fn([f64; 3]) -> [f64; 2]| {
             let at = |h: f64| of([x + slope[0] * h, y + slope[1] * h, z + h]);
             let [a, b] = [at(step), at(-step)];
@@ -287,7 +289,7 @@ proptest! {
             [(errors.q, projection.q), (errors.p, projection.p)].into_iter().enumerate()
         {
             let expected = (image[i] / map[i]).abs();
-            // Where the slope all but runs along a beam, differences lose their digits.
+            // Where the slope almost runs along a beam, differences lose their digits.
             let is_blunt = (1e-2..1e2).contains(&proj);
             prop_assert!(
                 !is_blunt || (pers * proj / expected - 1.0).abs() < 1e-5,
@@ -296,7 +298,7 @@ proptest! {
         }
     }
 
-    /// At right angles, Theory's E is W&P's m in other units; with the logarithm too.
+    /// At right angles Theory's E equals W&P's m in other units, for logarithmic rows too.
     #[test]
     fn overhead_is_a_right_angle(view in views(), strength in -3.0..4.0f64, z in 0.0..=1.0f64) {
         let lambda = (view.far() - view.near()) * 10f64.powf(-strength);
@@ -322,8 +324,8 @@ proptest! {
         prop_assert!((log.log_error(0.3 * z, z).unwrap() / view.log_error() / 2.0 - 1.0).abs() < 1e-9);
     }
 
-    /// W&P Eqs. 7, 8 against their parameterization (Eqs. 5, 6), differentiated numerically, and against its
-    /// printed pieces 10 and 12 in the papers' range of λ.
+    /// W&P Eqs. 7 and 8 against numerical derivatives of their parameterization (Eqs. 5, 6), and,
+    /// in the papers' range of λ, against their printed forms 10 and 12.
     #[test]
     fn overhead_errors_are_the_derivatives_of_the_map(view in views(), z in 0.0..1.0f64, eta in -0.98..1.0f64) {
         let (n, f, k) = (view.near(), view.far(), view.tan_phi());
@@ -348,19 +350,20 @@ proptest! {
         prop_assert!((overhead.storage_factor() / storage - 1.0).abs() < 1e-9);
         prop_assert!((overhead.max_s() / (f * lambda / (n * f_w)) - 1.0).abs() < 1e-9);
 
-        // η counts how far M_t is from its least to its largest value on either side (Appendix B).
+        // On either side of 0, η is linear in M_t between its least and its largest value
+        // (Appendix B).
         let max_t = |lambda| Overhead::new(view, lambda).unwrap().max_t();
         let least = max_t(view.lambda_l());
         let end = if eta < 0.0 { f64::INFINITY } else { n };
         let share = (max_t(lambda) - least) / (max_t(end) - least);
-        // Hardly anything changes between η = 0 and ±1 if f/n is about 1.
+        // If f/n is about 1, hardly anything changes between η = 0 and ±1.
         let digits = 1e-9 / (max_t(end) / least - 1.0);
         prop_assert!((share - eta.abs()).abs() < 1e-9 + digits, "{share} {eta}");
         prop_assert!((view.eta_from_lambda(lambda).unwrap() - eta).abs() < 1e-9 + digits);
     }
 }
 
-/// The papers' misprints, as printed: each is off by what the formula's documentation says.
+/// The papers' misprints as printed: each differs by what the formula's documentation says.
 #[test]
 fn printed_forms_fail() {
     let (f, phi) = (100.0, FRAC_PI_6);
@@ -373,7 +376,8 @@ fn printed_forms_fail() {
         let tilted = at(degrees);
         let warped = tilted.warped(lambda).unwrap();
         let (mu, k) = (tilted.mu(), f64::tan(phi));
-        // Zhang et al., appendix. At θ = φ both branches of tan φ_w apply, of F_p the second is printed.
+        // Zhang et al., appendix. At θ = φ both branches of tan φ_w apply; of F_p the second
+        // branch is evaluated as printed.
         let (tan_phi_w, f_p) = if degrees > 30.0 {
             (f * k / (mu + lambda), sin * sin * (mu / sin) / (k * lambda * (lambda + mu)))
         } else {
@@ -381,11 +385,11 @@ fn printed_forms_fail() {
         };
         close(tan_phi_w / warped.tan_phi_w(), q_off, 1e-2, &format!("tan φ_w at {degrees}°"));
         close(f_p / warped.f_p(), p_off, 2e-3, &format!("F_p at {degrees}°"));
-        // With it, V's far upper corner would lie outside the map.
+        // With the printed form, V's far upper corner lies outside the map.
         let corner = f * k / (warped.z_w(f * k, f) * tan_phi_w);
         assert_eq!(corner > 1.0 + 1e-9, degrees == 60.0, "{degrees}°: {corner}");
     }
-    // §3.1 has all minima at z = f.
+    // §3.1 places all minima at z = f.
     for (degrees, depth) in [(90.0, 10.0), (60.0, 18.05)] {
         let least = at(degrees).warped(lambda).unwrap().extrema().p.least;
         close(least.z, depth, 1e-3, &format!("least E_p at {degrees}°"));
@@ -402,7 +406,7 @@ fn printed_forms_fail() {
     assert!(lit > 0.9 && step.series(0.2 - 0.6) < 0.1);
 }
 
-/// Smaller λ than n: V's near corners stick out of the W that the papers' tan φ_w gives, and errors across
+/// λ smaller than n: V's near corners lie outside the W of the papers' tan φ_w, and errors across
 /// the map are largest at the far plane.
 #[test]
 fn short_lambdas_keep_the_near_corners() {
@@ -431,7 +435,7 @@ fn lambdas_by_technique() {
         // δ = √(n f) − n of μ = f − n, and δ = 19 − n.
         (Rule::Tsm { focus: None }, 99.0 * 9.0 * 0.2 / (0.8 * 99.0 - 9.0)),
         (Rule::Tsm { focus: Some(19.0) }, 99.0 * 18.0 * 0.2 / (0.8 * 99.0 - 18.0)),
-        // Before the view, and beyond 80% of it.
+        // A focus in front of the view, and a focus beyond 80% of it.
         (Rule::Tsm { focus: Some(0.5) }, f64::INFINITY),
         (Rule::Tsm { focus: Some(80.2) }, f64::INFINITY),
         (STORAGE, 11.0),
@@ -450,10 +454,10 @@ fn lambdas_by_technique() {
     assert!(range < 40.0);
     for rule in [Rule::Psm, Rule::Lispsm, Rule::LispsmInRange, STORAGE, AREA, Rule::Log] {
         assert_eq!(lambda(0.0, rule), f64::INFINITY, "{rule:?}: light along the view");
-        // The same beams, whichever way light takes them.
+        // The beams are the same in both directions of the light.
         close(lambda(140.0, rule), lambda(40.0, rule), 1e-12, &format!("{rule:?} at 140°"));
     }
-    // λ_L: equal errors along the map at both ends, and no λ with a smaller M_t.
+    // λ_L gives equal errors along the map at both ends, and no other λ has a smaller M_t.
     let max_t = |lambda| Overhead::new(paper_view(), lambda).unwrap().max_t();
     let at_l = Overhead::new(paper_view(), paper_view().lambda_l()).unwrap();
     close(at_l.m_t(1.0).unwrap(), at_l.m_t(100.0).unwrap(), 1e-12, "λ_L");
@@ -463,7 +467,7 @@ fn lambdas_by_technique() {
 proptest! {
     #![proptest_config(config(2000))]
 
-    /// Eq. 12 has the focus at 80% of the map.
+    /// By Eq. 12 the focus lies at 80% of the map.
     #[test]
     fn tsm_gives_the_focus_its_rows(view in views(), theta in thetas(), z in 0.0..1.0f64) {
         let focus = view.near() * (view.far() / view.near()).powf(z);
@@ -480,7 +484,8 @@ proptest! {
         }
     }
 
-    /// λ* of views deeper than 9:1, light outside the view's own sides: the corners' errors are equal.
+    /// λ* for views deeper than 9 : 1 and light outside the view's own sides gives equal errors at
+    /// both corners.
     #[test]
     fn storage_of_deep_views(view in views(), theta in 0.0..=1.0f64) {
         let (n, f, phi) = (view.near(), view.far(), view.half_fov_rad());
@@ -495,7 +500,8 @@ proptest! {
         prop_assert!((lower(n) / lower(f) - 1.0).abs() < 1e-9);
     }
 
-    /// The adaptive warp never needs more texels than another, and changes smoothly with θ, by φ too.
+    /// The adaptive warp never needs more texels than another one, and changes smoothly with θ,
+    /// also at θ = φ.
     #[test]
     fn adaptive_gains_everywhere(view in views(), theta in thetas()) {
         let tilted = Tilted::new(view, theta).unwrap();
@@ -537,7 +543,7 @@ fn plan(camera: &Camera, theta: f64, technique: &Technique) -> Plan {
     planner.plan(camera, &[sun(theta)], &Bounds::default(), technique).unwrap().clone()
 }
 
-/// What the planner calls a rule; `None` for what it has no name for.
+/// The planner's name for a rule; `None` for rules that the planner does not have.
 fn planners(rule: Rule) -> Option<Warp> {
     Some(match rule {
         Rule::Uniform => Warp::Uniform,
@@ -551,7 +557,8 @@ fn planners(rule: Rule) -> Option<Warp> {
     })
 }
 
-/// Theory's errors are those of the planner's finished matrices, for every warp and degree.
+/// Theory's errors equal those of the planner's finished matrices, for every warp and at every
+/// degree.
 #[test]
 fn planned_maps_have_the_errors_of_the_theory() {
     let res = [700, 900];
@@ -606,7 +613,7 @@ fn planned_maps_have_the_errors_of_the_theory() {
     }
 }
 
-/// The planner's λ, found by searching matrices and corners, is the closed form's.
+/// The planner's λ, found by a search over matrices and corners, equals the closed form.
 #[test]
 fn planned_maps_have_the_lambda_of_the_theory() {
     for view in
@@ -618,7 +625,8 @@ fn planned_maps_have_the_lambda_of_the_theory() {
             let Some(warp) = planners(rule) else { continue };
             let tilted = Tilted::new(view, theta).unwrap();
             let expected = tilted.lambda(rule).unwrap();
-            // The planner limits what would jump, and fades it out as the view turns into the light.
+            // The planner limits warps that would jump, and fades them out as the view direction
+            // approaches the light direction.
             let strongest = view.near() / theta.sin();
             let sides = view.half_fov_rad().sin();
             let is_the_rule = match rule {
@@ -630,11 +638,11 @@ fn planned_maps_have_the_lambda_of_the_theory() {
                 continue;
             }
             let plan = plan(&camera, theta, &Technique { warp, ..Technique::default() });
-            // In 1/λ, where no warp is one of many.
+            // The comparison is in 1/λ, in which no warp is an ordinary value.
             let found = plan.maps[0].lambda.map_or(0.0, |l| tilted.mu() / l);
             let expected = tilted.mu() / expected;
-            // A search finds a minimum to the root of the digits there are, and the planner's leans by a hair
-            // to less error along the map.
+            // A search finds a minimum to half the available digits only, and the planner's cost
+            // slightly prefers a smaller error along the map.
             let tolerance = if matches!(rule, Rule::Adaptive(_)) { 1e-5 } else { 1e-6 };
             assert!(
                 (found - expected).abs() <= tolerance * (0.1 + expected),
@@ -644,7 +652,7 @@ fn planned_maps_have_the_lambda_of_the_theory() {
     }
 }
 
-/// Storage of all kinds of partitions against W&P's Eqs. 17 to 21 and the planner.
+/// Storage of all kinds of partitions against W&P's Eqs. 17 to 21 and against the planner.
 #[test]
 fn storage_of_partitions() {
     for view in [paper_view(), View::new(0.3, 700.0, 0.9).unwrap()] {
@@ -664,7 +672,7 @@ fn storage_of_partitions() {
                     check(overhead(rule), slices * (a - 1.0) / (2.0 * tan), 18);
                 }
             }
-            // Nothing to warp, whatever the rule.
+            // There is nothing to warp, whatever the rule.
             for rule in
                 RULES.into_iter().filter(|r| !matches!(r, Rule::Tsm { .. } | Rule::Lambda(_)))
             {
@@ -674,18 +682,18 @@ fn storage_of_partitions() {
             check(behind(Rule::Lispsm), 4.0 * slices * (a - 1.0) / 2.0 + 1.0, 21);
             check(behind(Rule::Uniform), 4.0 * slices * a * (a - 1.0) / 2.0 + 1.0, 21);
 
-            // The planner cuts, fits, searches and measures.
+            // The planner cuts, warps, searches and measures.
             for (degrees, rule) in [0, 7, 29, 30, 44, 63, 90, 118].into_iter().flat_map(|d| {
                 [Rule::Uniform, Rule::LispsmInRange, STORAGE, Rule::Lambda(3.0)].map(|r| (d, r))
             }) {
                 let theta = f64::from(degrees).to_radians();
                 if rule == STORAGE && theta.sin() < view.half_fov_rad().sin() / 4.0 {
-                    // There the planner fades it out.
+                    // The planner fades out the warp at this angle.
                     continue;
                 }
                 let warp = planners(rule).unwrap();
                 let partition = umbrage::Partition::slices(k);
-                // So many texels that rounding to whole ones is no matter.
+                // So many texels that rounding to whole ones does not matter.
                 let size = Size::Budget(1 << 32);
                 let technique = Technique { warp, partition, size, ..Technique::default() };
                 let planned = plan(&camera, theta, &technique).storage_factor();
@@ -707,8 +715,8 @@ fn budgets_are_split_for_equal_errors() {
     close(critical[0] * critical[1], 1e6 * overhead.storage_factor(), 1e-12, "S̄ res_i²");
 }
 
-/// Coefficients of the series by quadrature of the step it stands for, which has period 2: lit, 1, for
-/// 0 < z − d < 1, else 0.
+/// Coefficients of the series by quadrature of the step of period 2, which is 1 (lit) for 0 < z −
+/// d < 1 and otherwise 0.
 #[test]
 fn the_step_is_a_fourier_series() {
     let step = FourierStep::new(16, 0.7).unwrap();
@@ -717,7 +725,7 @@ fn the_step_is_a_fourier_series() {
         .map(|i| 2.0 * (f64::from(i) + 0.5) / f64::from(POINTS) - 1.0)
         .map(|x| [x, step.series(x), f64::from(u8::from(x > 0.0))])
         .collect();
-    // Over the period, of the series and of the step times a wave.
+    // Integrals over one period of the series and of the step, each times a wave.
     let integrals = |wave: &dyn Fn(f64) -> f64| {
         [1, 2].map(|i| {
             samples.iter().map(|s| s[i] * wave(s[0])).sum::<f64>() * 2.0 / f64::from(POINTS)
@@ -732,7 +740,7 @@ fn the_step_is_a_fourier_series() {
         let k = f64::from(j + 1) / 2.0;
         let is_kept = j % 2 == 1 && k <= 16.0;
         let expected = if is_kept { of_step * (-0.7 * (k / 16.0).powi(2)).exp() } else { 0.0 };
-        // The midpoint rule at a step is good to (wave/points)².
+        // The midpoint rule across a step is accurate to (wave/points)².
         assert!((sine - expected).abs() < 1e-5, "sine {j}: {sine}, not {expected}");
         assert!(cosine.abs() < 1e-9, "cosine {j}: {cosine}");
     }
@@ -775,7 +783,7 @@ fn offsets_light_what_is_lit() {
         let step = FourierStep::new(order, attenuation).unwrap();
         let offset = step.offset();
         assert!((0.0..=0.5).contains(&offset), "o_{order} = {offset}");
-        // Nothing before it reaches 1.
+        // The series does not reach 1 before the offset.
         let before = (0..2000).map(|i| step.series(offset * f64::from(i) / 2000.0));
         assert!(before.fold(0.0, f64::max) < 1.0, "M = {order}, α = {attenuation}");
         let surface = |at| step.visibility(0.4, 0.4, at).unwrap();
@@ -788,7 +796,8 @@ fn offsets_light_what_is_lit() {
         close(surface(StepAt { offset: false, scale: true }), 1.0, 1e-12, "a lit surface, scaled");
         close(surface(StepAt::default()), 0.5, 1e-12, "a lit surface");
     }
-    // Too much attenuation: as light as it gets, but for what no eye sees, and not far from the contact.
+    // With too much attenuation, the offset is near the contact, and the series there is as light
+    // as it gets up to an invisible difference.
     for (order, attenuation) in [(1, 1.0), (2, 3.0), (8, 30.0), (16, 2.0)] {
         let step = FourierStep::new(order, attenuation).unwrap();
         let offset = step.offset();
@@ -834,7 +843,7 @@ fn what_makes_no_sense_is_refused_by_name() {
         assert_eq!(field(tilted.lambda(rule).map(drop)), "theory.focus", "{bad}");
     }
     let warped = tilted.warped(2.0).unwrap();
-    // Behind the eye, and behind W's centre of projection.
+    // Points behind the eye, and behind W's centre of projection.
     for [y, z] in [[0.0, 0.0], [0.0, -1.0], [f64::NAN, 5.0], [0.0, f64::INFINITY], [30.0, 5.0]] {
         assert_eq!(field(warped.errors(y, z).map(drop)), "theory.point", "{y} {z}");
         assert_eq!(field(warped.log_error(y, z).map(drop)), "theory.point", "{y} {z}");
@@ -846,14 +855,14 @@ fn what_makes_no_sense_is_refused_by_name() {
     for slope in [[f64::NAN, 0.0], [0.0, f64::INFINITY]] {
         assert_eq!(field(warped.projection(point, slope).map(drop)), "theory.slope", "{slope:?}");
     }
-    // On the axis and along it neither image nor map move sideways, but E_q has a limit. Beside it the map
-    // alone stands still.
+    // On the axis and along it neither the image nor the map moves sideways, but E_q has a limit.
+    // Beside the axis only the map does not move.
     let unwarped = Tilted::new(view, 0.0).unwrap().warped(f64::INFINITY).unwrap();
     assert_eq!(unwarped.projection(point, [0.0, 0.5]).unwrap().q, 1.0);
     assert_eq!(unwarped.projection([1.0, 0.0, 5.0], [0.0, 0.5]).unwrap().q, f64::INFINITY);
     let along_both = unwarped.projection([0.0, 0.0, 5.0], [0.0, 0.0]);
     assert_eq!(field(along_both.map(drop)), "theory.slope");
-    // Along the light alone: no bound, but no nonsense either.
+    // Along the light alone the error is unbounded, but not NaN.
     let along_light = 1.0 / f64::tan(PI / 4.0);
     let edge_on = Tilted::new(view, PI / 4.0).unwrap().warped(2.0).unwrap();
     assert!(edge_on.projection([0.1, -1.0, 5.0], [0.3, along_light]).unwrap().p > 1e12);
@@ -879,7 +888,7 @@ fn what_makes_no_sense_is_refused_by_name() {
     assert_eq!(storage(1, Faces::Sides, LightFrom::Behind), "theory.faces");
     assert_eq!(storage(1, Faces::SidesAndNear, LightFrom::Angle(1.0)), "theory.faces");
     assert_eq!(storage(1, Faces::Whole, LightFrom::Angle(4.0)), "theory.theta_rad");
-    // Slices without depth.
+    // Slices without depth are errors.
     let thin = View::new(1.0, 1.0 + 4e-16, 0.5).unwrap();
     let cut = storage_factor(thin, Rule::Uniform, 16, Faces::Whole, LightFrom::Overhead);
     assert_eq!(field(cut.map(drop)), "theory.slices");
@@ -906,7 +915,7 @@ fn what_makes_no_sense_is_refused_by_name() {
     }
 }
 
-/// At the ends of what is allowed nothing turns into NaN, and errors stay positive.
+/// At the ends of the valid ranges no result is NaN, and errors stay positive.
 #[test]
 fn extreme_situations_stay_numbers() {
     let ends = [[1e-12, 1e12], [1e-12, 2e-12], [1e11, 1e12], [1.0, 1.0 + 1e-15]];
@@ -919,7 +928,7 @@ fn extreme_situations_stay_numbers() {
             let what = format!("{view:?}, θ = {theta}");
             assert!(tilted.mu() > 0.0, "{what}");
             for rule in RULES {
-                // A focus or a λ of metres may be out of all proportion.
+                // A focus or a λ in metres may be disproportionate to the view.
                 let lambda = tilted.lambda(rule).unwrap();
                 assert!(lambda > 0.0, "{what}, {rule:?}: λ = {lambda}");
                 let Ok(warped) = tilted.warped(lambda) else {
@@ -930,7 +939,7 @@ fn extreme_situations_stay_numbers() {
                 for e in [extrema.q, extrema.p, extrema.product] {
                     assert!(e.least.value > 0.0, "{what}, {rule:?}: {e:?}");
                     assert!(e.largest.value.is_finite(), "{what}, {rule:?}: {e:?}");
-                    // To what 1e12 leaves of 16 digits.
+                    // At 1e12 about this many of 16 digits remain.
                     assert!(
                         e.least.value <= e.largest.value * (1.0 + 1e-3),
                         "{what}, {rule:?}: {e:?}"

@@ -1,40 +1,41 @@
-//! The chart at a glance, and the legend of the error maps that is its axis.
+//! The overview chart, and the legend of the error maps, which is the chart's axis.
 
 use super::numbers::{percent, power_of_two, significant};
 use crate::color::color_at;
 use crate::{ErrorScale, Measured, Report};
 use std::fmt::Write;
 
-/// A mark on the scale of pixels per texel.
+/// A tick of the scale of pixels per texel.
 pub(super) struct Tick {
-    /// From the left, percent.
+    /// Distance from the left end, percent of the scale.
     pub(super) at: f32,
     pub(super) label: String,
-    /// Whether this is 1 pixel per texel.
+    /// Whether this tick marks 1 pixel per texel.
     pub(super) one: bool,
 }
 
-/// One technique's line in the chart.
+/// The line of one technique in the chart.
 pub(super) struct Line {
-    /// Widths of the bars, percent of the track.
+    /// Widths of the two bars, percent of the track.
     pub(super) false_light: f64,
     pub(super) false_shadow: f64,
-    /// What the bars say, in words.
+    /// The text beside the bars.
     pub(super) wrong_text: String,
     pub(super) range: Option<Range>,
 }
 
-/// Median, 95th percentile and maximum on the scale of pixels per texel, percent from the left.
+/// Median, 95th percentile and maximum of pixels per texel: distances from the left end of the
+/// scale, in percent.
 pub(super) struct Range {
     pub(super) p50: f32,
     pub(super) p95: f32,
     pub(super) max: f32,
-    /// Whether the maximum lies beyond the scale.
+    /// Whether the maximum lies beyond the end of the scale.
     pub(super) beyond: bool,
     pub(super) text: String,
 }
 
-/// The scale's colours as a CSS gradient from left to right.
+/// The colours of the scale from left to right, as the stops of a CSS gradient.
 pub(super) fn gradient() -> String {
     let mut css = "linear-gradient(to right".to_owned();
     for i in 0..=32 {
@@ -45,7 +46,8 @@ pub(super) fn gradient() -> String {
     css + ")"
 }
 
-/// About seven powers of two, 1 among them and the ends if they are powers.
+/// About seven powers of two. 1 is one of them, and so are the ends of the scale if they are
+/// powers.
 pub(super) fn ticks(scale: ErrorScale) -> Vec<Tick> {
     let largest = scale.max().log2().floor() as i32;
     let step = (largest + 1) / 3;
@@ -60,7 +62,7 @@ pub(super) fn ticks(scale: ErrorScale) -> Vec<Tick> {
     exponents.iter().map(tick).collect()
 }
 
-/// The results' lines, in their order.
+/// The lines of the results, in the order of the results.
 pub(super) fn lines(report: &Report, scale: ErrorScale) -> Vec<Line> {
     let wrong = report.results.iter().filter_map(|r| r.metrics.wrong_fraction);
     let widest = wrong.fold(0.0, f64::max);
@@ -98,7 +100,8 @@ fn line(result: &Measured, widest: f64, scale: ErrorScale) -> Line {
 }
 
 fn percent_from_left(scale: ErrorScale, error_px: f64) -> f32 {
-    // NaN cannot be: report figures come from finite errors; the middle would be a harmless place.
+    // The error is never NaN, because the figures of a report come from finite errors. If it were,
+    // the mark would stand in the middle of the scale.
     50.0 + 50.0 * scale.position(error_px as f32).unwrap_or(0.0)
 }
 

@@ -1,4 +1,4 @@
-//! The page of the papers' figures.
+//! The page with the figures of the papers.
 
 use super::view::url;
 use crate::{Error, write_file};
@@ -6,38 +6,40 @@ use askama::Template;
 use serde::Serialize;
 use std::path::Path;
 
-/// Figures with their files, ready to be shown.
+/// Figures with their files, and all else that their page shows.
 #[derive(Clone, Copy, Debug)]
 pub struct FiguresPage<'a> {
-    /// In the page's order.
+    /// The figures in the order of the page.
     pub figures: &'a [FigureShown],
-    /// The command line that makes this page again.
+    /// The command line that produced this page.
     pub command: &'a str,
 }
 
 /// One figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FigureShown {
-    /// Its anchor on the page: small letters, digits and hyphens.
+    /// The figure's anchor on the page: lower-case letters, digits and hyphens.
     pub name: String,
-    /// What it shows.
+    /// What the figure shows.
     pub title: String,
-    /// Which figure of which paper.
+    /// The paper that the figure comes from, and its number there.
     pub source: String,
-    /// What to see in it, a paragraph.
+    /// A paragraph about what the figure tells.
     pub text: String,
-    /// Pictures and tables.
+    /// The figure's pictures and tables.
     pub files: Vec<FigureFile>,
 }
 
 /// A picture or a table of a figure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FigureFile {
-    /// Its name in the page's folder; `.csv` is a table, all else a picture.
+    /// The file's name in the page's folder. Files that end in `.csv` are tables, all others are
+    /// pictures.
     pub file: String,
-    /// What it shows, for those who cannot see it, or what a table's rows are.
+    /// For a picture, a description for readers who cannot see it; for a table, what its rows are.
     pub about: String,
-    /// What the page shows of a table, the headings first; empty for all else.
+    /// The rows of a table that the page shows, starting with the headings; empty for pictures and
+    /// for tables that are only linked.
     #[serde(skip)]
     pub rows: Vec<Vec<String>>,
 }
@@ -57,11 +59,11 @@ struct Html<'a> {
     command: &'a str,
 }
 
-/// Writes `figures.json`, the list of figures, and then `index.html` into `folder`, which must exist and hold
-/// the figures' files. The page opens offline.
+/// Writes `figures.json`, the list of figures, and then `index.html` into `folder`, which must
+/// exist and contain the figures' files. The page opens offline.
 ///
 /// # Errors
-/// If a file is missing in `folder`, or the two cannot be written.
+/// A file is missing in `folder`, or one of the two cannot be written.
 pub fn write_figures(folder: impl AsRef<Path>, page: &FiguresPage<'_>) -> Result<(), Error> {
     let folder = folder.as_ref();
     let mut files = page.figures.iter().flat_map(|f| &f.files);

@@ -1,4 +1,4 @@
-//! The HTML pages: a report's, a sweep's, the papers' figures.
+//! The HTML pages of reports, of sweeps, and of the papers' figures.
 
 mod chart;
 mod figures;
@@ -13,30 +13,30 @@ pub use figures::{FigureFile, FigureShown, FiguresPage, write_figures};
 use std::path::Path;
 pub use sweep::{SweepPage, write_sweep};
 
-/// A report with its pictures, ready to be shown.
+/// A report with its pictures and all else that its page shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Page<'a> {
-    /// The figures.
+    /// The report and its figures.
     pub report: &'a Report,
-    /// The truth's pictures.
+    /// The pictures of the truth.
     pub truth: &'a Pictures,
-    /// The techniques' pictures, one a result, in the results' order.
+    /// The pictures of the techniques, one set for each result, in the order of the results.
     pub pictures: &'a [Pictures],
-    /// What the error maps were drawn with.
+    /// The colour scale of the error maps.
     pub scale: ErrorScale,
-    /// What the reader should know about how this was made (repairs on loading the scene, options
-    /// that were left out), a sentence each.
+    /// Notices for the reader about how the report was made (repairs on loading the scene, options
+    /// without effect), one sentence each.
     pub notices: &'a [String],
-    /// The command line that makes this report again, if there is one.
+    /// The command line that produced this report; `None` leaves it out.
     pub command: Option<&'a str>,
 }
 
-/// Writes `report.json` and then `index.html` into `folder`, which must exist and hold the pictures.
-/// The page opens offline and needs nothing but the pictures beside it.
+/// Writes `report.json` and then `index.html` into `folder`, which must exist and contain the
+/// pictures. The page opens offline and needs only the pictures beside it.
 ///
 /// # Errors
-/// If there are no results, not one set of pictures a result, a picture is missing in `folder`, or
-/// the files cannot be written.
+/// There are no results, the number of picture sets is not that of the results, a picture is
+/// missing in `folder`, or a file cannot be written.
 pub fn write_report(folder: impl AsRef<Path>, page: &Page<'_>) -> Result<(), Error> {
     let folder = folder.as_ref();
     check(folder, page)?;
@@ -58,7 +58,7 @@ fn check(folder: &Path, page: &Page<'_>) -> Result<(), Error> {
         return wrong("report.size", "must be at least 1 pixel each way".to_owned());
     }
     if results != sets {
-        return wrong("pictures", format!("must be one set a result ({results}), are {sets}"));
+        return wrong("pictures", format!("must be one set per result ({results}), not {sets}"));
     }
     let missing = page
         .pictures
@@ -94,7 +94,7 @@ mod tests {
             write_report(folder.path(), &page).map_err(|e| e.to_string())
         };
         assert_eq!(write(0, &[]).unwrap_err(), "report.results: must not be empty");
-        let one_too_few = "pictures: must be one set a result (2), are 1";
+        let one_too_few = "pictures: must be one set per result (2), not 1";
         assert_eq!(write(2, std::slice::from_ref(&there)).unwrap_err(), one_too_few);
         assert!(write(1, &[gone]).unwrap_err().starts_with("pictures: gone.png is not in "));
         assert!(!folder.path().join("report.json").exists());

@@ -1,9 +1,9 @@
-//! Numbers for readers.
+//! Formats numbers for readers.
 
-/// What stands for a figure that is not known.
+/// The text for an unknown figure.
 pub(super) const UNKNOWN: &str = "–";
 
-/// Three significant digits, grouped by thousands: `0.0132`, `4.10`, `1 230`.
+/// Three significant digits, with thousands grouped: `0.0132`, `4.10`, `1 230`.
 pub(super) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -11,7 +11,7 @@ pub(super) fn significant(value: f64) -> String {
     if value.abs() < 1e-4 {
         return format!("{value:.1e}").replace('-', "−");
     }
-    // Of the rounded value: 9.996 has one digit more before its point than its logarithm says.
+    // Digits are counted on the rounded value, because 9.996 becomes 10.0.
     let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
     let decimals = (2.0 - rounded.abs().log10().floor()).max(0.0) as usize;
     let text = format!("{rounded:.decimals$}");
@@ -21,17 +21,17 @@ pub(super) fn significant(value: f64) -> String {
     }
 }
 
-/// A share as a percentage, without its sign: `1.32`.
+/// A share as a percentage, without the percent sign: `1.32`.
 pub(super) fn percent(share: f64) -> String {
     significant(share * 100.0)
 }
 
-/// A count, grouped by thousands.
+/// A count, with thousands grouped.
 pub(super) fn count(n: u64) -> String {
     grouped(&n.to_string())
 }
 
-/// A duration in the unit that suits it: `0.800 ms`, `12.3 s`, `4.50 min`.
+/// A duration in a suitable unit: `0.800 ms`, `12.3 s`, `4.50 min`.
 pub(super) fn duration_ms(ms: f64) -> String {
     match ms {
         ms if ms < 1e3 => format!("{} ms", significant(ms)),
@@ -40,19 +40,19 @@ pub(super) fn duration_ms(ms: f64) -> String {
     }
 }
 
-/// A vector as `(1, −2.5, 0)`, to millimetres.
+/// A vector such as `(1, −2.5, 0)`, rounded to three decimals.
 pub(super) fn vector(v: [f64; 3]) -> String {
     format!("({})", v.map(plain).join(", "))
 }
 
-/// At most three decimals, no trailing zeros.
+/// A number with at most three decimals and no trailing zeros.
 pub(super) fn plain(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
 }
 
-/// 2 to the power of `exponent`, below 1 as a fraction: `1/8`, `1`, `32`.
+/// 2 to the power of `exponent`; powers below 1 as a fraction: `1/8`, `1`, `32`.
 pub(super) fn power_of_two(exponent: i32) -> String {
     let power = 1_u64 << exponent.unsigned_abs();
     if exponent < 0 { format!("1/{power}") } else { power.to_string() }
@@ -63,7 +63,7 @@ fn grouped(digits: &str) -> String {
     let mut text = sign.to_owned();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            // Narrow no-break space.
+            // A narrow no-break space.
             text.push('\u{202f}');
         }
         text.push(digit);

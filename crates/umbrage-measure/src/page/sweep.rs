@@ -1,4 +1,4 @@
-//! What the template of a sweep's page shows, put into words.
+//! Fills the template of a sweep's page.
 
 use super::numbers::{percent, significant};
 use super::table::{self, Cell, Column};
@@ -8,21 +8,21 @@ use crate::{Error, Mean, Measured, Sweep, SweptView, write_file};
 use askama::Template;
 use std::path::Path;
 
-/// A sweep, ready to be shown.
+/// A sweep with all that its page shows.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepPage<'a> {
-    /// The figures.
+    /// The sweep and its figures.
     pub sweep: &'a Sweep,
-    /// The command line that makes this page again, if there is one.
+    /// The command line that produced this page; `None` leaves it out.
     pub command: Option<&'a str>,
 }
 
-/// Writes `results.csv`, `results.json` and then `index.html` into `folder`, which must exist and hold the
-/// views' reports. The page opens offline.
+/// Writes `results.csv`, `results.json` and then `index.html` into `folder`, which must exist and
+/// contain the views' reports. The page opens offline.
 ///
 /// # Errors
-/// If there are no specifications, a view's results are not those of the sweep's specifications, its
-/// report is missing in `folder`, or the files cannot be written.
+/// There are no specifications, the results of a view are not those of the sweep's specifications,
+/// the report of a view is missing in `folder`, or a file cannot be written.
 pub fn write_sweep(folder: impl AsRef<Path>, page: &SweepPage<'_>) -> Result<(), Error> {
     let folder = folder.as_ref();
     let sweep = page.sweep;
@@ -44,8 +44,8 @@ pub fn write_sweep(folder: impl AsRef<Path>, page: &SweepPage<'_>) -> Result<(),
     write_file(path, html.as_bytes())
 }
 
-/// The page. User text goes through askama's escaping; what is marked `safe` in the template is this
-/// crate's own.
+/// The template's fields. askama escapes text from users; the template marks only text of this
+/// crate as `safe`.
 #[derive(Template)]
 #[template(path = "sweep.html")]
 struct Html<'a> {
@@ -73,12 +73,12 @@ struct ShownMean<'a> {
     error: Cell,
 }
 
-/// One view.
+/// One view, as the page shows it.
 struct Shown<'a> {
     view: &'a SweptView,
     page: String,
     thumbnail: String,
-    /// One a technique.
+    /// One for each technique.
     wrong: Vec<Cell>,
     rows: Vec<Row<'a>>,
 }
@@ -103,7 +103,7 @@ impl<'a> Html<'a> {
             true,
         ));
         let shadows = settings.shadows.iter().map(String::as_str);
-        // An option asks for what specifications do not say.
+        // `max_error` holds for those specifications that do not state texels.
         let executed = settings.shadows.iter().map(|shadows| match settings.max_error {
             Some(pixels) if !shadows.contains('@') => format!("{shadows}@{pixels}px"),
             _ => shadows.clone(),
@@ -198,7 +198,7 @@ fn finding(sweep: &Sweep, means: &[Mean]) -> Finding {
     }
 }
 
-/// What the means are over.
+/// A sentence that says which views the means are over.
 fn means_over(sweep: &Sweep, means: &[Mean]) -> String {
     let views = means.first().map_or(0, |m| m.views);
     let done = sweep.reports().count();
@@ -222,14 +222,15 @@ fn setup(sweep: &Sweep) -> Vec<(&'static str, String)> {
     let settings = &sweep.settings;
     let [w, h] = settings.size;
     let mut setup = vec![
-        ("Pictures", format!("{w} × {h} pixels, where a view has no size of its own")),
+        ("Pictures", format!("{w} × {h} pixels, unless a view states its size")),
         ("Truth", rays_a_pixel(settings.samples.pow(2))),
         ("Maps fitted to", fitted_to(&settings.fit).to_owned()),
         ("Executed by", settings.backend.clone()),
     ];
     if let Some(pixels) = settings.max_error {
-        let few =
-            format!("the fewest for at most {pixels} px a texel, where a technique does not say");
+        let few = format!(
+            "the fewest for at most {pixels} px per texel, if a technique states no texels"
+        );
         setup.push(("Texels", few));
     }
     if settings.opaque {

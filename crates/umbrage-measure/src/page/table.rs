@@ -3,15 +3,16 @@
 use super::numbers::{UNKNOWN, count, percent, significant};
 use crate::Measured;
 
-/// A column: what it shows of a result, and how.
+/// A column of the table: which figure of a result it shows, and how.
 pub(super) struct Column {
     pub(super) heading: &'static str,
     pub(super) unit: &'static str,
-    /// For the tooltip.
+    /// Explanation of the figure, shown as a tooltip.
     pub(super) meaning: &'static str,
-    /// Whether a smaller figure is a better one; columns without a better are not highlighted.
+    /// Whether a smaller figure is better. If not, no figure of the column is highlighted as the
+    /// best.
     smaller_is_better: bool,
-    /// Whether it stays when nobody has a figure.
+    /// Whether the column is shown even if no result has the figure.
     always: bool,
     value: fn(&Measured) -> Option<f64>,
     text: fn(f64) -> String,
@@ -20,7 +21,7 @@ pub(super) struct Column {
 /// A figure in the table.
 pub(super) struct Cell {
     pub(super) text: String,
-    /// What to sort by; empty if unknown.
+    /// Text by which the table is sorted; empty if the figure is unknown.
     pub(super) key: String,
     pub(super) best: bool,
 }
@@ -42,9 +43,11 @@ const fn column(
     }
 }
 
-/// The columns that have something to show of these results.
+/// The columns for which at least one of these results has a figure, and those that are always
+/// shown.
 pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
-    // Times differ by more than techniques do from one run to the next: no laurels for these.
+    // No time is highlighted as the best, because times differ more from run to run than from
+    // technique to technique.
     let rare = |c: Column| Column { always: false, ..c };
     let unjudged = |c: Column| Column { smaller_is_better: false, ..c };
     let time = |c: Column| rare(unjudged(c));
@@ -54,22 +57,31 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
         share(column(
             "Wrong",
             "%",
-            "Counted pixels whose visibility is off by more than half",
+            "Share of counted pixels whose visibility differs from the truth by more than half",
             |r| r.metrics.wrong_fraction,
         )),
-        share(column("False light", "%", "Counted pixels that are lit and should be dark", |r| {
-            r.metrics.false_light
-        })),
-        share(column("False shadow", "%", "Counted pixels that are dark and should be lit", |r| {
-            r.metrics.false_shadow
-        })),
-        column("Mean error", "0–1", "Mean absolute difference of visibility", |r| {
-            r.metrics.mean_abs_error
-        }),
+        share(column(
+            "False light",
+            "%",
+            "Share of counted pixels that are lit but should be dark",
+            |r| r.metrics.false_light,
+        )),
+        share(column(
+            "False shadow",
+            "%",
+            "Share of counted pixels that are dark but should be lit",
+            |r| r.metrics.false_shadow,
+        )),
+        column(
+            "Mean error",
+            "0–1",
+            "Mean absolute difference between visibility and truth",
+            |r| r.metrics.mean_abs_error,
+        ),
         column(
             "ꟻLIP",
             "0–1",
-            "Difference that a viewer flipping between both pictures would notice",
+            "Difference that a person who flips between both pictures would notice",
             |r| r.metrics.flip,
         ),
         column("p50", "px/texel", "Median of pixels per texel", |r| r.error_px.p50),
@@ -84,7 +96,7 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
         rare(unjudged(share(column(
             "Culled",
             "%",
-            "Triangles that need not be drawn into a map",
+            "Share of triangles that need not be drawn into a map",
             |r| r.casters_culled,
         )))),
         rare(share(column(
@@ -101,7 +113,7 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
         )),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
         whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
-        rare(whole(column("Memory", "KiB", "What lookup reads of the maps", |r| {
+        rare(whole(column("Memory", "KiB", "Memory that lookups read", |r| {
             r.bytes.map(|b| (b as f64 / 1024.0).ceil())
         }))),
         time(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),
@@ -114,7 +126,7 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
     columns.into_iter().filter(has_figures).collect()
 }
 
-/// The results' rows of cells, which compete within their columns.
+/// The table's rows. In each column, the best cells are marked.
 pub(super) fn rows(columns: &[Column], results: &[Measured]) -> Vec<Vec<Cell>> {
     let mut rows: Vec<Vec<Cell>> = results.iter().map(|_| Vec::new()).collect();
     for column in columns {
@@ -126,14 +138,14 @@ pub(super) fn rows(columns: &[Column], results: &[Measured]) -> Vec<Vec<Cell>> {
 }
 
 impl Column {
-    /// The cells of this column, in the results' order.
+    /// The cells of this column, in the order of the results.
     pub(super) fn cells(&self, results: &[Measured]) -> Vec<Cell> {
         let values: Vec<_> = results.iter().map(self.value).collect();
         cells(&values, self.text, self.smaller_is_better)
     }
 }
 
-/// Cells of figures that compete with one another.
+/// The cells of figures that are compared with each other.
 pub(super) fn cells(
     values: &[Option<f64>],
     text: fn(f64) -> String,

@@ -1,4 +1,4 @@
-//! What the template shows, put into words.
+//! Fills the template of a report's page.
 
 use super::Page;
 use super::chart::{self, Line, Tick};
@@ -8,19 +8,19 @@ use crate::{Error, LightInfo, Measured, Pictures, Report};
 use askama::Template;
 use serde::Serialize;
 
-/// The report's page. User text goes through askama's escaping; what is marked `safe` in the template
-/// is this crate's own or escaped here.
+/// The template's fields. askama escapes text from users; the template marks as `safe` only text of
+/// this crate and text that is escaped here.
 #[derive(Template)]
 #[template(path = "report.html")]
 pub(super) struct Html<'a> {
     css: &'static str,
     js: &'static str,
-    /// JSON for the script, escaped for use in HTML.
+    /// JSON for the script, escaped for use inside HTML.
     data: String,
     version: &'static str,
     scene: &'a str,
     size: [u32; 2],
-    /// Too small for smooth enlarging to be of any use.
+    /// Whether the pictures are so small that they are enlarged without smoothing.
     small: bool,
     facts: String,
     finding: Finding,
@@ -43,20 +43,20 @@ pub(super) struct Html<'a> {
     command: Option<&'a str>,
 }
 
-/// The outcome in a sentence: emphasised name, then the rest.
+/// The result in a sentence: a name to emphasise, then the rest.
 pub(super) struct Finding {
     pub(super) name: String,
     pub(super) rest: String,
 }
 
-/// A kind of picture to look at.
+/// A kind of picture that the viewer can show.
 #[derive(Serialize)]
 struct Kind {
     id: &'static str,
     label: &'static str,
 }
 
-/// One result.
+/// One result, as the page shows it.
 struct Shown<'a> {
     result: &'a Measured,
     pictures: &'a Pictures,
@@ -64,16 +64,16 @@ struct Shown<'a> {
     line: Line,
     wrong: Option<String>,
     best: bool,
-    /// The words of its specification, each with a sentence.
+    /// The words of the result's specification, each with a sentence that explains it.
     description: Vec<(String, &'static str)>,
-    /// Figures under the card's name.
+    /// The figures below the name on the result's card.
     figures: Vec<(&'static str, String)>,
-    /// Pictures that have no place of their own on the card: label and file.
+    /// Links to the pictures that the card does not show: label and file.
     more: Vec<(&'static str, &'a str)>,
 }
 
 impl Pictures {
-    /// Kind and name of each file.
+    /// The kind and the name of each file.
     pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let always = [("color", &self.color), ("visibility", &self.visibility)];
         let some = [
@@ -158,7 +158,8 @@ impl<'a> Html<'a> {
     }
 }
 
-/// The result with the fewest wrong pixels, then the smallest mean error, if there are others.
+/// The index of the result with the fewest wrong pixels and, among several of these, the smallest
+/// mean error; `None` if there is only one result.
 fn best(report: &Report) -> Option<usize> {
     let figures = |r: &Measured| Some((r.metrics.wrong_fraction?, r.metrics.mean_abs_error?));
     let known = report.results.iter().enumerate().filter_map(|(i, r)| Some((i, figures(r)?)));
@@ -173,7 +174,7 @@ fn finding(report: &Report, best: Option<usize>) -> Finding {
     if first.metrics.counted == 0 {
         return Finding {
             name: String::new(),
-            rest: "No pixel shows a surface that faces the light: there is nothing to measure."
+            rest: "No pixel shows a surface that faces the light, so there is nothing to measure."
                 .to_owned(),
         };
     }
@@ -217,12 +218,12 @@ fn truth_how(report: &Report) -> String {
 
 pub(super) fn rays_a_pixel(n: u32) -> String {
     match n {
-        1 => "one ray a pixel".to_owned(),
-        n => format!("{n} rays a pixel"),
+        1 => "one ray per pixel".to_owned(),
+        n => format!("{n} rays per pixel"),
     }
 }
 
-/// A count of things: `1 view`, `1 200 views`.
+/// A number of things, as in `1 view` and `1 200 views`.
 pub(super) fn plural(n: u64, thing: &str) -> String {
     format!("{} {thing}{}", count(n), if n == 1 { "" } else { "s" })
 }
@@ -308,7 +309,7 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
     setup
 }
 
-/// The words of these specifications, each with a sentence.
+/// The words of these specifications, each with a sentence that explains it, without repetitions.
 pub(super) fn techniques<'a>(
     specifications: impl Iterator<Item = &'a str>,
 ) -> Vec<(String, &'static str)> {
@@ -323,7 +324,7 @@ pub(super) fn techniques<'a>(
     techniques
 }
 
-/// Specifications, and the Rust code that makes the technique which each stands for.
+/// For each specification, the Rust code that constructs its technique.
 pub(super) fn codes<'a>(
     techniques: impl Iterator<Item = (&'a str, &'a str)>,
 ) -> Vec<(String, String)> {
@@ -335,13 +336,13 @@ pub(super) fn codes<'a>(
         .collect()
 }
 
-/// What the script needs, as JSON that can stand inside an HTML `script` element.
+/// The data that the script needs, as JSON that is safe inside an HTML `script` element.
 fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
     #[derive(Serialize)]
     struct Data<'a> {
         size: [u32; 2],
         kinds: &'a [Kind],
-        /// The truth, then the results.
+        /// The truth, followed by the results.
         items: Vec<Item<'a>>,
     }
     #[derive(Serialize)]
@@ -361,11 +362,11 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
     let items = std::iter::once(item("Truth", None, page.truth))
         .chain(results.map(|(r, p)| item(&r.shadows, r.metrics.wrong_fraction, p)));
     let data = Data { size: page.report.size, kinds, items: items.collect() };
-    // A string in it might close the element or open a comment.
+    // A `<` in a string could close the element or open a comment.
     Ok(serde_json::to_string(&data)?.replace('<', "\\u003c"))
 }
 
-/// A file name as a relative URL.
+/// The relative URL of a file.
 pub(super) fn url(file: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
     let escape = |b: u8| {
@@ -451,7 +452,7 @@ mod tests {
         };
         assert_eq!(shows(&report), [false; 3]);
         report.motion = Some(crate::Motion { kind: "orbit".to_owned(), frames: 6 });
-        // Nothing that both frames show need face the light.
+        // No flicker was measured, because no point that faces the light is shown in both frames.
         assert_eq!(shows(&report), [true, false, false]);
         report.results[1].flicker = Some(0.0);
         assert_eq!(shows(&report), [true, true, false]);

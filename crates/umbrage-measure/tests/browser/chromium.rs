@@ -1,4 +1,4 @@
-//! As much of the DevTools protocol as these tests need, to drive a real Chromium.
+//! The part of the DevTools protocol that these tests need to drive a real Chromium.
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 use serde_json::{Value, json};
@@ -8,20 +8,20 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
-/// What to start, from `CHROMIUM` if set.
+/// Programs to try, unless `CHROMIUM` names one.
 const NAMES: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
-/// How long the browser may take for one thing before the test gives up on it.
+/// How long the browser may take for one action before the test fails.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A Chromium with one page open. It ends with this value.
+/// A Chromium with one open page. Dropping this value ends the process.
 pub(crate) struct Browser {
     process: Child,
     socket: WebSocket<TcpStream>,
     session: String,
     next_id: u64,
-    /// What the page complained about: exceptions, the console, files that did not load.
+    /// What the page reported: exceptions, messages on the console, files that did not load.
     pub(crate) complaints: Vec<String>,
-    /// What the page asked for.
+    /// The addresses that the page requested.
     pub(crate) requests: Vec<String>,
     _profile: tempfile::TempDir,
 }
@@ -50,7 +50,8 @@ impl Browser {
         browser
     }
 
-    /// Opens a file in a window of the given size, and waits until it and its pictures are there.
+    /// Opens a file in a window of the given size, and waits until the page and its pictures are
+    /// loaded.
     pub(crate) fn open(&mut self, file: &Path, [width, height]: [u32; 2], mobile: bool) {
         let metrics =
             json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile});
@@ -80,7 +81,7 @@ impl Browser {
         }
     }
 
-    /// Where the middle of the element is in the window, after scrolling it into view.
+    /// The position of the element's centre in the window, after scrolling it into view.
     pub(crate) fn middle(&mut self, selector: &str) -> [f64; 2] {
         let [x, y, w, h] = self.rect(selector);
         [x + w / 2.0, y + h / 2.0]
@@ -91,7 +92,7 @@ impl Browser {
         self.eval(&format!(
             "document.querySelector({selector:?}).scrollIntoView({{block: 'center', behavior: 'instant'}})"
         ));
-        // Until it is painted there, a touch would still go to where it was.
+        // Before the new position is painted, a touch would still go to the old one.
         self.wait_for_paint();
         let rect = self.eval(&format!(
             "(() => {{ const r = document.querySelector({selector:?}).getBoundingClientRect(); \
@@ -116,7 +117,7 @@ impl Browser {
         self.mouse("mouseReleased", at, false);
     }
 
-    /// A finger that goes down at the first point, over the others, and up.
+    /// A finger that touches the window at the first point, moves over the others, and is lifted.
     pub(crate) fn finger(&mut self, points: &[[f64; 2]]) {
         for (i, [x, y]) in points.iter().enumerate() {
             let kind = if i == 0 { "touchStart" } else { "touchMove" };
@@ -147,9 +148,9 @@ impl Browser {
         }
     }
 
-    /// What the window shows.
+    /// The content of the window.
     pub(crate) fn screenshot(&mut self) -> image::RgbImage {
-        // Two frames later everything asked for before has been painted.
+        // After two frames, everything requested before has been painted.
         self.eval(
             "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))",
         );
@@ -158,14 +159,14 @@ impl Browser {
         image::load_from_memory(&png).unwrap().to_rgb8()
     }
 
-    /// Two frames later everything asked for before has been painted.
+    /// Waits for two frames, after which everything requested before has been painted.
     fn wait_for_paint(&mut self) {
         self.eval(
             "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))",
         );
     }
 
-    /// Sends a command and waits for its answer, taking in what happens meanwhile.
+    /// Sends a command and waits for its answer. Events that arrive meanwhile are recorded.
     pub(crate) fn call(&mut self, method: &str, params: Value) -> Value {
         self.next_id += 1;
         let id = self.next_id;
@@ -210,7 +211,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // It may have gone by itself; there is nothing left to end then.
+        // The process may have ended by itself, and nothing is left to do then.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -223,7 +224,8 @@ fn launch(profile: &Path) -> Child {
         let process = Command::new(name)
             .args([
                 "--headless=new",
-                // Its sandbox does not start for root or in containers; it sees our own files only.
+                // Chromium's sandbox does not start for root or in containers. The pages are all
+                // our own files.
                 "--no-sandbox",
                 "--no-first-run",
                 "--disable-quic",
@@ -250,7 +252,7 @@ fn launch(profile: &Path) -> Child {
     );
 }
 
-/// Chromium writes port and path of its socket to a file in its profile when it is ready.
+/// When it is ready, Chromium writes the port and path of its socket to a file in its profile.
 fn connect(profile: &Path) -> WebSocket<TcpStream> {
     let start = Instant::now();
     let (port, path) = loop {

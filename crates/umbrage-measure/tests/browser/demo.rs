@@ -1,5 +1,5 @@
-//! A report on a small world of spheres on a plane, with crude shadow maps worked out per pixel: real
-//! enough to look at, and with a known place for everything.
+//! A report on a small scene of spheres on a plane, with crude shadow maps computed per pixel. It
+//! looks real, and the position of everything is known.
 
 use std::path::Path;
 use umbrage_measure::{
@@ -28,7 +28,7 @@ fn cross(a: V, b: V) -> V {
 const EYE: V = [0.0, 2.4, 7.0];
 const SUN_TRAVELS: V = [-0.62, -0.58, -0.52];
 
-/// Centre and radius: rows of spheres going away from the eye.
+/// Centres and radii of rows of spheres that recede from the eye.
 fn spheres() -> impl Iterator<Item = (V, f32)> {
     (0..36).map(|i| {
         let (column, row) = (i % 4, i / 4);
@@ -54,7 +54,7 @@ fn hit(origin: V, direction: V) -> Option<(f32, V)> {
 struct Sample {
     point: V,
     normal: V,
-    /// Along the view direction.
+    /// Distance along the view direction.
     depth: f32,
 }
 
@@ -71,7 +71,7 @@ fn first_hits(size: [u32; 2]) -> Image<Option<Sample>> {
     .unwrap()
 }
 
-/// How a crude shadow map spreads its texels: their width at a view depth, metres.
+/// How a crude shadow map distributes its texels: their width at a view depth, metres.
 struct Technique {
     name: &'static str,
     texel_m: fn(f32) -> f32,
@@ -109,7 +109,7 @@ fn look_up(samples: &Image<Option<Sample>>, technique: &Technique) -> (Image<f32
     let s = unit(cross(to_sun, [0.0, 0.0, 1.0]));
     let t = cross(s, to_sun);
     let texel = |sample: &Sample| {
-        // Steps of an eighth of an octave, so that neighbours share their grid.
+        // Widths are rounded to an eighth of an octave, so that neighbours share a grid.
         ((technique.texel_m)(sample.depth).log2() * 8.0).round().div_euclid(1.0) / 8.0
     };
     let lit = |sample: &Option<Sample>| {
@@ -123,7 +123,7 @@ fn look_up(samples: &Image<Option<Sample>>, technique: &Technique) -> (Image<f32
             (c.floor() + 0.5 - c) * width
         };
         let center = add(add(sample.point, s, to_center(s)), t, to_center(t));
-        // The receiver's plane at the texel's centre, and a bit towards the light.
+        // Where the receiver's plane passes the texel's centre, moved slightly towards the light.
         let off = dot(add(center, sample.point, -1.0), sample.normal) / dot(sample.normal, to_sun);
         let on_plane = add(center, to_sun, width * 0.3 - off);
         f32::from(hit(on_plane, to_sun).is_none())
@@ -139,7 +139,7 @@ fn look_up(samples: &Image<Option<Sample>>, technique: &Technique) -> (Image<f32
     (samples.map(lit), samples.map(error))
 }
 
-/// The world with `n` results. The first five differ, further ones repeat them under other names.
+/// The scene with `n` results. The first five differ; the others repeat them under other names.
 pub(crate) fn spheres_on_a_plane(size: [u32; 2], n: usize) -> Compared {
     let samples = first_hits(size);
     let to_sun = unit(add([0.0; 3], SUN_TRAVELS, -1.0));
@@ -171,8 +171,8 @@ pub(crate) fn spheres_on_a_plane(size: [u32; 2], n: usize) -> Compared {
     }
 }
 
-/// A truth all of one colour, and techniques all of others; the truth is lit everywhere, the techniques
-/// nowhere.
+/// A truth in a single colour, and techniques in other colours. The truth is lit everywhere, the
+/// techniques nowhere.
 pub(crate) fn flat(size: [u32; 2], truth: Rgb, results: &[(&str, Rgb)]) -> Compared {
     let all = |color| Image::from_fn(size, |_, _| color).unwrap();
     let result = |&(name, color): &(&str, Rgb)| {
@@ -190,7 +190,7 @@ pub(crate) fn flat(size: [u32; 2], truth: Rgb, results: &[(&str, Rgb)]) -> Compa
     }
 }
 
-/// All that goes into a report.
+/// All that a report is made from.
 pub(crate) struct Compared {
     pub(crate) scene: String,
     pub(crate) color: Image<Rgb>,
@@ -199,7 +199,7 @@ pub(crate) struct Compared {
     pub(crate) results: Vec<Pictured>,
 }
 
-/// What one technique shows.
+/// The pictures of one technique.
 #[derive(Clone)]
 pub(crate) struct Pictured {
     pub(crate) name: String,
@@ -230,7 +230,7 @@ impl Compared {
                 bytes: None,
                 metrics: measure(truth.visibility, visibility, counted).unwrap(),
                 error_px: measure_error_px(error_px, counted).unwrap(),
-                // One unknown figure, to be told from zero.
+                // One figure is unknown and must be distinguished from zero.
                 casters_culled: Some(0.1 * (i % 5) as f64),
                 flicker: None,
                 noise: None,

@@ -1,4 +1,4 @@
-//! The report in a real browser: Chromium, started here, nothing but files.
+//! The report in a real browser: a Chromium that is started here and only reads files.
 
 mod chromium;
 mod demo;
@@ -13,7 +13,8 @@ const RED: Rgb = [220, 30, 20];
 const GREEN: Rgb = [20, 160, 60];
 const BLUE: Rgb = [30, 60, 230];
 
-/// Writes a report into a folder that stays until the next run, so that one can look at it.
+/// Writes a report into a folder that is kept until the next run, so that the page can be
+/// inspected.
 fn report(name: &str, compared: &Compared) -> (PathBuf, Report) {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("reports").join(name);
     let _ = std::fs::remove_dir_all(&folder);
@@ -23,7 +24,7 @@ fn report(name: &str, compared: &Compared) -> (PathBuf, Report) {
     (folder.join("index.html"), report)
 }
 
-/// That the page had nothing to complain about and asked for files only.
+/// Checks that the page reported no problem and requested only files.
 fn check_quiet(browser: &Browser) {
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
     let offline = |url: &&String| url.starts_with("file:") || url.starts_with("data:");
@@ -32,7 +33,8 @@ fn check_quiet(browser: &Browser) {
     assert!(!browser.requests.is_empty());
 }
 
-/// Scrolls through the page so that every picture is asked for, and checks that all came, whole.
+/// Scrolls through the page so that every picture is requested, and checks that all of them are
+/// loaded completely.
 fn check_pictures(browser: &mut Browser, [w, h]: [u32; 2]) {
     browser.eval(
         "(async () => { for (let y = 0; y < document.body.scrollHeight; y += innerHeight / 2) { \
@@ -46,7 +48,7 @@ fn check_pictures(browser: &mut Browser, [w, h]: [u32; 2]) {
     assert_eq!(wrong, json!([]));
 }
 
-/// That nothing sticks out of the window but what scrolls by itself.
+/// Checks that nothing extends beyond the window, except elements that scroll by themselves.
 fn check_fits(browser: &mut Browser, context: &str) {
     let wide = browser.eval("document.documentElement.scrollWidth - innerWidth");
     assert!(wide.as_f64().unwrap() <= 0.0, "{context}: {wide} pixels too wide");
@@ -60,7 +62,7 @@ fn check_fits(browser: &mut Browser, context: &str) {
     assert_eq!(outside, json!([]), "{context}");
 }
 
-/// The colour at a point of the window, as an average of 3×3 pixels.
+/// The colour at a point of the window, as the mean of 3×3 pixels.
 fn seen(browser: &mut Browser, [x, y]: [f64; 2]) -> Rgb {
     let shot = browser.screenshot();
     let mut sum = [0_u32; 3];
@@ -99,7 +101,7 @@ fn divider_moves_by_mouse_touch_and_keyboard() {
     browser.open(&index, [1280, 900], false);
     check_pictures(&mut browser, [64, 48]);
     let [x, y, w, h] = browser.rect("#stage");
-    // Off the middle, where neither grip, magnifier nor a name covers the picture.
+    // The row is not the middle one, where the grip, the magnifier or a name covers the picture.
     let at = |percent: f64| [x + w * percent / 100.0, y + h * 0.1];
     let value = "Number(document.querySelector('#divider').getAttribute('aria-valuenow'))";
 
@@ -115,7 +117,7 @@ fn divider_moves_by_mouse_touch_and_keyboard() {
     browser.mouse("mouseMoved", at(30.0), false);
     assert_eq!(browser.eval(value), json!(90), "moving without pressing must not drag");
 
-    // Dragging has put the keyboard there too.
+    // Dragging has moved the keyboard focus to the divider.
     for (key, expected) in [("ArrowLeft", 89), ("ArrowRight", 90), ("Home", 0), ("End", 100)] {
         browser.key(key);
         assert_eq!(browser.eval(value), json!(expected), "{key}");
@@ -168,7 +170,7 @@ fn controls_choose_what_is_shown() {
     browser.rect("#stage");
     assert_eq!(both(&mut browser), [BLUE, GREEN]);
 
-    // Tiles put a technique on the right, the truth on the left.
+    // A click on a tile shows its technique on the right and the truth on the left.
     browser.click(".tile[data-item='2']");
     browser.click(".tile[data-item='0']");
     browser.rect("#stage");
@@ -202,7 +204,7 @@ fn controls_choose_what_is_shown() {
 
 #[test]
 fn magnifier_shows_the_same_place_of_all_techniques() {
-    // The upper left quarter of each picture has the technique's colour, the rest is black.
+    // The upper left quarter of each picture has the technique's colour, and the rest is black.
     let mut compared = flat([640, 480], RED, &[("uniform", GREEN), ("lispsm", BLUE)]);
     let cut = |image: &umbrage_measure::Image<Rgb>| {
         umbrage_measure::Image::from_fn([640, 480], |x, y| {
@@ -231,20 +233,21 @@ fn magnifier_shows_the_same_place_of_all_techniques() {
     browser.mouse("mouseMoved", [x + w * 0.25, y + h * 0.25], false);
     assert_eq!(tiles(&mut browser), [RED, GREEN, BLUE]);
 
-    // By keyboard out of the coloured quarter again.
+    // The keyboard moves the magnifier out of the coloured quarter.
     browser.eval("document.querySelector('#reticle').focus()");
     for _ in 0..200 {
         browser.key("ArrowDown");
     }
     assert_eq!(tiles(&mut browser), [[0; 3]; 3]);
 
-    // A finger's tap.
+    // A tap of a finger moves the magnifier.
     browser.open(&index, [360, 740], true);
     check_pictures(&mut browser, [640, 480]);
     let [x, y, w, h] = browser.rect("#stage");
     browser.finger(&[[x + w * 0.2, y + h * 0.1]]);
     assert_eq!(tiles(&mut browser)[..2], [RED, GREEN]);
-    // Far away again, and back by the button on the card: all is wrong, so its first corner counts.
+    // The magnifier moves far away, and the button on the card brings it back. All pixels are
+    // wrong, so the first square counts as the worst.
     browser.rect("#stage");
     browser.finger(&[[x + w * 0.9, y + h * 0.9]]);
     browser.click("#result-2 .worst");
@@ -290,7 +293,7 @@ fn table_sorts_by_every_column() {
     }
     // The storage factor is the ninth figure, and a fifth of the techniques have none.
     assert_eq!(keys(&mut browser, 9).iter().filter(|k| k.is_empty()).count(), 4);
-    // Whoever has the fewest wrong pixels is highlighted for that.
+    // The technique with the fewest wrong pixels is highlighted.
     let best = "[...document.querySelectorAll('#table tbody tr')]\
                 .filter(r => r.cells[1].matches('.best')).map(r => Number(r.cells[1].dataset.key))";
     let best: Vec<f64> = serde_json::from_value(browser.eval(best)).unwrap();

@@ -1,4 +1,4 @@
-//! A depth pass over a plan's first map as one writes it without any library: plain wgpu.
+//! A depth pass over the first map of a plan, written in plain wgpu without any library.
 
 use bytemuck::{bytes_of, cast_slice};
 use glam::{DMat4, Mat4, Vec3, Vec4};
@@ -22,7 +22,7 @@ const SHADER: &str = "
         return clip_from_local * vec4f(dot(x, point), dot(y, point), dot(z, point), 1.0);
     }";
 
-/// What to draw, ready.
+/// Everything that the depth pass needs.
 pub(crate) struct BareDepth<'a> {
     scene: &'a Scene,
     view: wgpu::TextureView,
@@ -32,7 +32,7 @@ pub(crate) struct BareDepth<'a> {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     instances: wgpu::Buffer,
-    /// Indices, first vertex of each mesh.
+    /// Range of indices and first vertex of each mesh.
     meshes: Vec<(Range<u32>, i32)>,
     boxes: Vec<umbrage::Aabb>,
     by_mesh: Vec<usize>,
@@ -66,48 +66,7 @@ impl<'a> BareDepth<'a> {
             usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: None,
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: None,
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: None,
-                compilation_options: Default::default(),
-                buffers: &[
-                    Some(wgpu::VertexBufferLayout {
-                        array_stride: 12,
-                        step_mode: wgpu::VertexStepMode::Vertex,
-                        attributes: &wgpu::vertex_attr_array![0 => Float32x3],
-                    }),
-                    Some(wgpu::VertexBufferLayout {
-                        array_stride: 48,
-                        step_mode: wgpu::VertexStepMode::Instance,
-                        attributes: &wgpu::vertex_attr_array![
-                            1 => Float32x4, 2 => Float32x4, 3 => Float32x4
-                        ],
-                    }),
-                ],
-            },
-            primitive: wgpu::PrimitiveState {
-                unclipped_depth: gpu.support().depth_clip_control,
-                ..Default::default()
-            },
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Less),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment: None,
-            multiview_mask: None,
-            cache: None,
-        });
+        let pipeline = depth_pipeline(gpu);
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &pipeline.get_bind_group_layout(0),
@@ -141,7 +100,7 @@ impl<'a> BareDepth<'a> {
         }
     }
 
-    /// Draws the same triangles, culled alike, and submits.
+    /// Draws and submits the same triangles as the library, culled in the same way.
     pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan) {
         let map = &plan.maps[0];
         let ndc = DMat4::from_cols_array_2d(&[
@@ -190,4 +149,51 @@ impl<'a> BareDepth<'a> {
         drop(pass);
         gpu.queue().submit([encoder.finish()]);
     }
+}
+
+/// The pipeline of the depth pass, with positions and the rows of instance matrices as vertices.
+fn depth_pipeline(gpu: &Gpu) -> wgpu::RenderPipeline {
+    let device = gpu.device();
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: None,
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            buffers: &[
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: 12,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+                }),
+                Some(wgpu::VertexBufferLayout {
+                    array_stride: 48,
+                    step_mode: wgpu::VertexStepMode::Instance,
+                    attributes: &wgpu::vertex_attr_array![
+                        1 => Float32x4, 2 => Float32x4, 3 => Float32x4
+                    ],
+                }),
+            ],
+        },
+        primitive: wgpu::PrimitiveState {
+            unclipped_depth: gpu.support().depth_clip_control,
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: wgpu::TextureFormat::Depth32Float,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: None,
+        multiview_mask: None,
+        cache: None,
+    })
 }

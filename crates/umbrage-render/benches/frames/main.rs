@@ -1,11 +1,14 @@
-//! What the issue of speed is: ratios, of frames that take turns within one run.
+//! Measures the ratios that the project's goals for speed are stated in, between frames that take
+//! turns within one run.
 //!
 //! ```sh
 //! cargo bench -p umbrage-render
 //! ```
 //!
-//! Alpha masks are ignored, so that the pass without a library draws the same. Median wall-clock times, waiting for the GPU after each frame. Scenes beside the built-in ones come from the folder
-//! `$UMBRAGE_SCENES`, as for the tests; those that are missing are named and left out.
+//! Alpha masks are ignored, so that the depth pass without a library draws the same triangles.
+//! Times are medians of wall-clock times, with a wait for the GPU after each frame. Further scenes
+//! come from the folder `$UMBRAGE_SCENES`, as for the tests; scenes that are missing are named and
+//! left out.
 
 #![allow(missing_docs, reason = "a benchmark")]
 
@@ -23,10 +26,11 @@ use umbrage_wgpu::{Casters, ShadowOptions};
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Frames that take turns; the first two of each do not count.
+/// Number of frames of each job. The jobs take turns, and the first two frames of each do not
+/// count.
 const FRAMES: usize = 22;
 
-/// A scene with its own view and light.
+/// A scene with its default view and light.
 struct Set<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
@@ -56,7 +60,7 @@ impl<'a> Set<'a> {
         Ok(Renderer::new(self.gpu, &self.buffers, &options)?)
     }
 
-    /// Maps and picture.
+    /// Draws the maps and the picture.
     fn frame(
         &self,
         renderer: &mut Renderer<'_, '_>,
@@ -70,7 +74,7 @@ impl<'a> Set<'a> {
     }
 }
 
-/// Median milliseconds of some jobs that take turns.
+/// Median times of several jobs that take turns, milliseconds.
 fn race(jobs: &mut [&mut dyn FnMut() -> Result<(), Failure>]) -> Result<Vec<f64>, Failure> {
     let mut times = vec![Vec::new(); jobs.len()];
     for frame in 0..FRAMES {
@@ -92,7 +96,7 @@ fn race(jobs: &mut [&mut dyn FnMut() -> Result<(), Failure>]) -> Result<Vec<f64>
         .collect())
 }
 
-/// Techniques against each other.
+/// Compares techniques with each other. Returns the ratios lispsm / uniform and lispsm+z4 / lispsm.
 fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     let plan = |text: &str| set.plan(&text.parse()?);
     let (uniform, lispsm) = (plan("uniform:pcf3@1024")?, plan("lispsm:pcf3@1024")?);
@@ -106,7 +110,7 @@ fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
         &mut || set.frame(&mut c, &slices, &target),
     ])?;
     println!(
-        "  frame: uniform {:.1} ms, lispsm {:.1} ms ({:.3} of it), lispsm+z4 {:.1} ms ({:.3} of lispsm)",
+        "  frame: uniform {:.1} ms, lispsm {:.1} ms ({:.3} of uniform), lispsm+z4 {:.1} ms ({:.3} of lispsm)",
         times[0],
         times[1],
         times[1] / times[0],
@@ -116,14 +120,15 @@ fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     Ok([times[1] / times[0], times[2] / times[1]])
 }
 
-/// The depth pass against one without any library, and against nothing to do.
+/// Compares the depth pass with one written without any library, and a pass over unchanged maps
+/// with the first one. Returns both ratios.
 fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     let plan = set.plan(&"lispsm:pcf3@2048".parse()?)?;
     let mut moved = set.renderer(plan.filter)?;
-    let mut still = set.renderer(plan.filter)?;
+    let mut unmoved = set.renderer(plan.filter)?;
     let mut bare = BareDepth::new(set.gpu, set.scene, &plan);
     let start = Instant::now();
-    still.draw_maps(&plan, Casters::Unmoved, None)?;
+    unmoved.draw_maps(&plan, Casters::Unmoved, None)?;
     set.gpu.wait()?;
     let first = start.elapsed().as_secs_f64() * 1e3;
     let times = race(&mut [
@@ -136,12 +141,12 @@ fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
             Ok(set.gpu.wait()?)
         },
         &mut || {
-            still.draw_maps(&plan, Casters::Unmoved, None)?;
+            unmoved.draw_maps(&plan, Casters::Unmoved, None)?;
             Ok(set.gpu.wait()?)
         },
     ])?;
     println!(
-        "  depth pass, 2048²: {:.1} ms, bare wgpu {:.1} ms (ratio {:.3}); still {:.3} ms, first {:.1} ms (ratio {:.4})",
+        "  depth pass, 2048²: {:.1} ms, bare wgpu {:.1} ms (ratio {:.3}); unchanged {:.3} ms, first {:.1} ms (ratio {:.4})",
         times[0],
         times[1],
         times[0] / times[1],
@@ -152,7 +157,8 @@ fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
     Ok([times[0] / times[1], times[2] / first])
 }
 
-/// Convolution shadow maps against bilinear comparisons, in the configuration of Annen et al. 2007, Table 1: a map of 1024², a picture of 1024×768.
+/// Compares convolution shadow maps with bilinear comparisons, in the configuration of Annen et al.
+/// 2007, Table 1: a map of 1024², a picture of 1024×768.
 fn filters(gpu: &Gpu, scene: &Scene) -> Result<(), Failure> {
     let set = Set::new(gpu, scene, [1024, 768])?;
     let target = FrameTarget::new(gpu, set.camera.image())?;
@@ -178,7 +184,7 @@ fn filters(gpu: &Gpu, scene: &Scene) -> Result<(), Failure> {
 }
 
 fn main() -> Result<(), Failure> {
-    // `cargo test --benches` runs this too, and only wants to know that it can.
+    // `cargo test --benches` also runs this program, to check that it starts.
     if !std::env::args().any(|a| a == "--bench") {
         return Ok(());
     }
@@ -214,10 +220,10 @@ fn main() -> Result<(), Failure> {
         let ratios = [techniques(&set)?, depth_pass(&set)?].concat();
         sums.iter_mut().zip(ratios).for_each(|(sum, ratio)| *sum += f64::ln(ratio));
     }
-    let [lispsm, slices, bare, still] = sums.map(|s| (s / scenes.len() as f64).exp());
+    let [lispsm, slices, bare, unchanged] = sums.map(|s| (s / scenes.len() as f64).exp());
     println!(
         "geometric means: lispsm/uniform {lispsm:.3}, lispsm+z4/lispsm {slices:.3}, library/bare depth pass {bare:.3}, \
-         still/first {still:.4}"
+         unchanged/first {unchanged:.4}"
     );
     Ok(())
 }

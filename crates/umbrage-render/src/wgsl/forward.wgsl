@@ -1,21 +1,22 @@
-// A scene in the light of a sun or lamp and the sky. Render space is relative to the eye. Put before it: Umbrage's lookup
-// module in bind group 1.
+// A scene lit by one light and the sky. Render space is relative to the eye. Umbrage's lookup
+// module in bind group 1 must precede this text.
 
 struct View {
     clip_from_render: mat4x4f,
     // The ray of unit depth through the point (x, y) of the target is ray + x ray_x + y ray_y.
     ray: vec3f,
-    // Points of the target along each side of a pixel.
+    // Number of samples along each side of a pixel.
     grid: f32,
     ray_x: vec3f,
     light_kind: u32,
     ray_y: vec3f,
-    // Of a lamp, metres.
+    // Range of a spot or point light, metres.
     light_range: f32,
-    // Unit vectors: the view's way, and the light's.
+    // View direction, unit length.
     forward: vec3f,
-    // Of a spot light's half angle.
+    // Cosine of a spot light's half angle.
     light_cosine: f32,
+    // Direction in which the light travels, unit length.
     light_direction: vec3f,
     light_index: u32,
     light_position: vec3f,
@@ -37,7 +38,7 @@ const POINT: u32 = 2u;
 
 struct Material {
     base_color: vec4f,
-    // Below this alpha there is no surface; 0 if it is opaque.
+    // There is no surface where alpha is below this value; 0 for opaque materials.
     cutoff: f32,
 }
 
@@ -68,7 +69,8 @@ fn mesh_vertex(vertex: Vertex) -> Fragment {
     let z = vertex.render_from_mesh_z;
     let point = vec4f(vertex.position, 1.0);
     let position = vec3f(dot(x, point), dot(y, point), dot(z, point));
-    // Normals go by the cofactors, whose sign does not matter: they are turned to the seen side.
+    // Normals transform by the cofactor matrix. Its sign does not matter, because normals are
+    // turned to the visible side.
     let n = vertex.normal;
     let normal = vec3f(
         dot(cross(y.xyz, z.xyz), n),
@@ -87,7 +89,7 @@ fn sky_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
 }
 
 fn normalize_or_zero(v: vec3f) -> vec3f {
-    // Scaled first, as squares of small numbers vanish.
+    // The vector is scaled first, because the squares of small numbers underflow.
     let largest = max(abs(v.x), max(abs(v.y), abs(v.z)));
     if (largest <= 0.0) {
         return vec3f(0.0);
@@ -95,20 +97,20 @@ fn normalize_or_zero(v: vec3f) -> vec3f {
     return normalize(v / largest);
 }
 
-// A surface, as seen.
+// A visible surface.
 struct Surface {
     position: vec3f,
-    // Of the triangle, turned to the eye.
+    // Normal of the triangle, turned to the eye.
     normal: vec3f,
     shading_normal: vec3f,
     color: vec3f,
     is_facing: bool,
-    // Of the light that reaches it, by the shadow maps; 0 if it faces away.
+    // Visibility of the light by the shadow maps; 0 if the surface faces away from the light.
     visibility: f32,
 }
 
 fn surface(in: Fragment) -> Surface {
-    // Derivatives first, where all of a quad is still there.
+    // Derivatives are taken first, before parts of a quad are discarded.
     let normal = normalize_or_zero(shadow_normal(in.position));
     let texel = textureSampleLevel(material_texture, material_sampler, in.uv, 0.0);
     let color = material.base_color * texel;
@@ -135,7 +137,7 @@ fn to_light(position: vec3f) -> vec3f {
     return normalize_or_zero(view.light_position - position);
 }
 
-// Whether the light can reach a surface if nothing stands between.
+// Whether the light reaches a surface if nothing lies between them.
 fn faces_light(position: vec3f, normal: vec3f) -> bool {
     let light = to_light(position);
     if (dot(normal, light) <= 0.0) {
@@ -149,7 +151,8 @@ fn faces_light(position: vec3f, normal: vec3f) -> bool {
     return view.light_kind == DIRECTIONAL || length(from_light) <= view.light_range;
 }
 
-// A lamp's light fades to nothing at the end of its range (Karis 2013, without the inverse square).
+// A spot or point light fades to nothing at the end of its range (Karis 2013, without the inverse
+// square).
 fn attenuation(position: vec3f) -> f32 {
     let from_light = position - view.light_position;
     if (view.light_kind == DIRECTIONAL) {
@@ -165,7 +168,8 @@ fn attenuation(position: vec3f) -> f32 {
     return window * window;
 }
 
-// Linear colour: diffuse, in the light that reaches it, the sky's and the ground's.
+// Linear colour of a diffuse surface, lit by the light (as far as it is visible), the sky and the
+// ground.
 fn radiance(s: Surface) -> vec3f {
     let light = to_light(s.position);
     let incidence = max(dot(s.shading_normal, light), 0.0);
@@ -192,7 +196,7 @@ fn sky(target_position: vec2f) -> vec3f {
     return color;
 }
 
-// Khronos's PBR Neutral tone mapper (Khronos Group 2024).
+// The PBR Neutral tone mapper (Khronos Group 2024).
 fn compress(linear: vec3f) -> vec3f {
     let start = 0.8 - 0.04;
     let positive = max(linear, vec3f(0.0));
@@ -209,7 +213,7 @@ fn compress(linear: vec3f) -> vec3f {
     return mix(color * (new_peak / peak), vec3f(new_peak), gray);
 }
 
-// A frame to look at: the target's format encodes it.
+// A frame to display. The format of the target encodes it as sRGB.
 @fragment
 fn mesh_frame(in: Fragment) -> @location(0) vec4f {
     return vec4f(compress(radiance(surface(in))), 1.0);
@@ -220,7 +224,8 @@ fn sky_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
     return vec4f(compress(sky(at.xy)), 1.0);
 }
 
-// Light and shape. Visibility is -1 where the surface faces away from the light; depth is 0 in the sky.
+// Radiance and visibility, normal and depth. Visibility is -1 where the surface faces away from the
+// light. Depth is 0 in the sky.
 struct Picture {
     @location(0) radiance_visibility: vec4f,
     @location(1) normal_depth: vec4f,
@@ -239,7 +244,8 @@ fn sky_picture(@builtin(position) at: vec4f) -> Picture {
     return Picture(vec4f(sky(at.xy), 1.0), vec4f(0.0));
 }
 
-// Where the maps' texels lie: texel coordinates, index of the map in the plan (-1: none), pixels per texel (0: none).
+// Where texels lie: texel coordinates, index of the map in the plan (-1: none), and pixels per
+// texel (0: none).
 @fragment
 fn mesh_texels(in: Fragment) -> @location(0) vec4f {
     let s = surface(in);
@@ -248,13 +254,13 @@ fn mesh_texels(in: Fragment) -> @location(0) vec4f {
         return vec4f(0.0, 0.0, -1.0, 0.0);
     }
     let point = shadow_point(place.map, s.position);
-    // How the point moves on its plane from pixel to pixel.
+    // How the surface point moves on its plane from pixel to pixel.
     let ray = view.ray + in.clip.x * view.ray_x + in.clip.y * view.ray_y;
     let across = dot(s.normal, ray);
     let depth = dot(view.forward, s.position);
     let step_x = depth * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));
     let step_y = depth * view.grid * (view.ray_y - ray * (dot(s.normal, view.ray_y) / across));
-    // Texels per pixel; the larger singular value of the inverse.
+    // Texels per pixel; then the larger singular value of the inverse.
     let column_x = vec2f(dot(point.grad_s, step_x), dot(point.grad_t, step_x));
     let column_y = vec2f(dot(point.grad_s, step_y), dot(point.grad_t, step_y));
     let xx = dot(column_x, column_x);

@@ -1,4 +1,4 @@
-// Visibility at a list of points. Put before it: Umbrage's lookup module in bind group 0.
+// Visibility at a list of points. Umbrage's lookup module in bind group 0 must precede this text.
 
 struct Point {
     position: vec3f,

@@ -1,4 +1,5 @@
-//! On a real device, lavapipe where there is no other. Without any these tests fail: `tools/setup` installs one.
+//! Tests on a real device, or on lavapipe if there is no other. Without any device they fail;
+//! `tools/setup` installs lavapipe.
 
 mod parity;
 mod pictures;
@@ -11,11 +12,11 @@ use umbrage_render::Gpu;
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
 
-/// One device for all.
+/// The device that all tests share.
 pub(crate) static GPU: LazyLock<Gpu> =
     LazyLock::new(|| Gpu::open().expect("a GPU, or a driver in software: run tools/setup"));
 
-/// A scene by name: a file of the shared scenes, or built in.
+/// A scene by name: a file of the shared scenes, or a built-in scene.
 pub(crate) fn scene(name: &str) -> Scene {
     if !name.ends_with(".glb") {
         let (name, size) = name.split_once(':').unwrap_or((name, ""));
@@ -32,7 +33,7 @@ pub(crate) fn scene(name: &str) -> Scene {
     umbrage_scene::load(&path).unwrap()
 }
 
-/// A scene with its own view, ready for rays.
+/// A scene with its default view, prepared for ray tracing.
 pub(crate) struct Set<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) tracer: Tracer<'a>,

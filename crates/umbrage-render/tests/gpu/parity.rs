@@ -1,4 +1,4 @@
-//! The GPU's pictures against the reference's, which casts a ray through every texel.
+//! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
 use crate::{GPU, Set, scene};
 use glam::DVec3;
@@ -11,7 +11,7 @@ use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
 
 const IMAGE: [u32; 2] = [240, 135];
 
-/// Every warp that a GPU can draw, and every partition, each at least once.
+/// Every warp that a GPU can draw and every partition, each at least once.
 const TECHNIQUES: [&str; 10] = [
     "unfocused@512",
     "uniform+z4@512",
@@ -30,18 +30,18 @@ fn technique(text: &str, filter: Filter) -> Technique {
     Technique { filter, ..text.parse().unwrap() }
 }
 
-/// How the GPU's picture and the reference's differ, of the samples that count.
+/// Numbers of counted samples in which the pictures of the GPU and the reference differ.
 struct Difference {
     counted: usize,
-    /// Visibility by more than 1/2.
+    /// Visibility differs by more than 1/2.
     visibility: usize,
-    /// Not the same surface: the rasteriser's and the ray's edges differ by a 512th of a pixel or so.
+    /// The surface differs: edges by the rasteriser and by rays differ by some 512th of a pixel.
     surface: usize,
-    /// Not the same map, or another texel.
+    /// The map or the texel differs.
     place: usize,
-    /// Pixels per texel by more than 2%.
+    /// Pixels per texel differ by more than 2%.
     error: usize,
-    /// Colour where visibility is the same.
+    /// The colour differs although visibility is the same.
     color: usize,
 }
 
@@ -76,7 +76,7 @@ fn compare(
         let place = reference.texel(light.0, sample.surface.position);
         let map = place.map(|p| p.map as u32);
         let texel = place.map_or(0.0, |p| (p.texel - gpu.texel.as_dvec2()).length());
-        // A texel is as wide as several pixels, or a pixel as several texels.
+        // A texel may be several pixels wide, or a pixel several texels.
         d.place +=
             usize::from(map != gpu.map || (map.is_some() && (texel.is_nan() || texel >= 0.1)));
         let error = place.and_then(|p| {
@@ -106,7 +106,7 @@ fn draw(
     renderer.samples(shading, 0..set.camera.image()[1], 1, true).unwrap()
 }
 
-/// The shares that may differ, of the samples that count.
+/// Checks the shares of counted samples that may differ.
 fn check(name: &str, technique: &Technique, d: &Difference) {
     let share = |n: usize| n as f64 / d.counted as f64;
     let text = format!(
@@ -125,9 +125,10 @@ fn check(name: &str, technique: &Technique, d: &Difference) {
     assert!(share(d.color) <= 0.01, "{text}");
 }
 
-/// Some techniques in a scene's own view and light.
+/// Compares several techniques in a scene's default view and light.
 ///
-/// Those of [`TECHNIQUES`] with these indices: every scene has some, every technique two scenes at least.
+/// The indices refer to [`TECHNIQUES`]. Every scene gets some of them, and every technique at least
+/// two scenes.
 fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
     let scene = scene(name);
     let set = Set::new(&scene, IMAGE);
@@ -137,7 +138,7 @@ fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
     }
 }
 
-/// One technique in a scene's own light.
+/// Compares one technique in a scene's default light.
 fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     let light = set.light();
     let plan = set.plan(&[light], technique);
@@ -174,7 +175,7 @@ fn at_a_fence() {
     agrees("fence", [1, 4, 7]);
 }
 
-/// A point light: six maps, or more.
+/// A point light, which has six or more maps.
 #[test]
 fn around_a_lantern() {
     agrees("lantern", [1, 4, 7, 9]);
@@ -185,7 +186,7 @@ fn on_a_race_track() {
     agrees("vehicles/kenney_racing_level.glb", [2, 3, 5, 8]);
 }
 
-/// Alpha masks.
+/// Casters with alpha masks.
 #[test]
 fn in_a_forest() {
     agrees("trees/forest_eztree.glb", [0, 6, 7]);
@@ -206,7 +207,8 @@ fn in_a_house_of_centimetres() {
     agrees("house/house.glb", [2, 4, 6]);
 }
 
-/// Whatever a device lacks, the picture is the same, but for what comparisons by the texture unit cost.
+/// Whatever features a device lacks, the picture is the same, except for the accuracy that
+/// comparisons by the texture unit cost.
 #[test]
 fn every_fallback_draws_the_same_picture() {
     let scene = scene("town:20");
@@ -243,7 +245,7 @@ fn every_fallback_draws_the_same_picture() {
     }
 }
 
-/// What is filtered ahead of lookup, in four scenes, under an even map, a warp and slices.
+/// Every prefilter in four scenes, under a uniform map, a warp and slices.
 #[test]
 fn every_prefilter_in_four_scenes() {
     let csm = |m| Statistic::Csm(Csm::new(m, 0.0, false, true).unwrap());
@@ -267,7 +269,7 @@ fn every_prefilter_in_four_scenes() {
     }
 }
 
-/// Widths in pixels and metres: smaller copies of maps, and several samples along a footprint.
+/// Widths in pixels and in metres, which use mip levels and several samples along a footprint.
 #[test]
 fn every_width_in_four_scenes() {
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
@@ -278,7 +280,7 @@ fn every_width_in_four_scenes() {
     for name in ["town:20", "fence", "lantern", "trees/forest_eztree.glb"] {
         let scene = scene(name);
         let set = Set::new(&scene, IMAGE);
-        // A diameter of 0.3: of a sun per metre of distance, of a lamp in metres.
+        // A diameter of 0.3: per metre of distance for a sun, in metres for a spot or point light.
         let is_sun = matches!(set.light(), Light::Directional { .. });
         let light = if is_sun { LightSize::Degrees(17.1) } else { LightSize::Metres(0.3) };
         let filters = [
@@ -297,7 +299,7 @@ fn every_width_in_four_scenes() {
     }
 }
 
-/// A sun, a spot light and a point light in one plan, each looked up for itself.
+/// A directional, a spot and a point light in one plan, each looked up separately.
 #[test]
 fn several_lights_share_a_plan() {
     let scene = scene("lantern");
@@ -324,7 +326,8 @@ fn several_lights_share_a_plan() {
     }
 }
 
-/// The world's origin is far away: the camera's matrices, the maps' and the instances' keep their digits.
+/// Far from the world's origin, the matrices of the camera, the maps and the instances keep their
+/// precision.
 #[test]
 fn a_million_metres_from_the_origin() {
     let mut scene = scene("pole");

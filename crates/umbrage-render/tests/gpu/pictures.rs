@@ -1,4 +1,4 @@
-//! Frames and samples are of one picture, however it is cut.
+//! Frames and samples belong to the same picture, whatever the tiles.
 
 use crate::{GPU, Set, scene};
 use umbrage::{Partition, Technique};
@@ -7,7 +7,7 @@ use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
 use wgpu::{BufferUsages, MapMode, PollType};
 
-/// sRGB of a frame.
+/// The sRGB colours of a frame.
 fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
     let (device, queue, texture) = (GPU.device(), GPU.queue(), target.color());
     let bytes_per_row = (4 * texture.width()).next_multiple_of(256);
@@ -37,7 +37,8 @@ fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
     .collect()
 }
 
-/// The shader's tone mapping and the texture's encoding are those of the reference's pictures.
+/// The shader's tone mapping and the texture's encoding agree with those of the reference's
+/// pictures.
 #[test]
 fn a_frame_looks_as_its_samples_do() {
     let scene = scene("town:20");
@@ -62,7 +63,7 @@ fn a_frame_looks_as_its_samples_do() {
     assert!(samples.iter().all(|s| s.map.is_none() && s.error.is_nan()), "not asked for");
 }
 
-/// Tiles, rows and grids only choose which samples there are.
+/// Tiles, rows and grids only select samples.
 #[test]
 fn samples_are_those_of_a_larger_picture() {
     let scene = scene("sphere");
@@ -74,7 +75,7 @@ fn samples_are_those_of_a_larger_picture() {
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
     renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
     let shading = Shading { camera: &coarse.camera, light: &light, light_index: 0 };
-    // Twice 700 samples do not fit into one tile.
+    // Two times 700 samples do not fit into one tile.
     let samples = renderer.samples(&shading, 40..70, 2, true).unwrap();
     assert_eq!(samples.len(), 700 * 30 * 4);
     let fine = Set::new(&scene, [1400, 192]);
@@ -93,7 +94,7 @@ fn samples_are_those_of_a_larger_picture() {
     assert!(differing * 500 < samples.len(), "{differing} of {}", samples.len());
 }
 
-/// What does not change is not drawn again, over the renderer too.
+/// Maps that do not change are not drawn again by the renderer.
 #[test]
 fn still_maps_are_drawn_once() {
     let scene = scene("fence");

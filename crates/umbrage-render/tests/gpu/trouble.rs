@@ -1,4 +1,4 @@
-//! What cannot be done is said, and nothing panics.
+//! Impossible requests give errors, and nothing panics.
 
 use crate::{GPU, Set, scene};
 use umbrage::{Size, Technique, Warp};

@@ -4,8 +4,9 @@ use crate::types::Scene;
 use glam::{Affine3A, DVec3, Mat3A, Quat, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
-/// Metres between planes of a line, and between lines.
+/// Distance between the planes of a line, metres.
 const SPACING: f64 = 13.5;
+/// Distance between lines, metres.
 const LINES: f64 = 26.0;
 const PLANES_IN_LINE: u32 = 8;
 
@@ -48,14 +49,14 @@ pub(super) fn airfield(size: u32) -> Scene {
     }
     tower(&mut stage, Vec3::new(width as f32 + 12.0, 0.0, -length as f32 - 16.0));
     let lens = Lens { fov_y_deg: 45.0, near: 0.4, far: f64::from(reach) * 1.6 };
-    // Beside the noses of the first line.
+    // The camera stands beside the noses of the first line.
     let eye = DVec3::new(LINES - 5.6, 2.5, 2.6);
     stage.camera("noses", eye, DVec3::new(LINES - 8.2, 1.1, -16.0), lens);
     stage.sun(DVec3::new(0.74, -0.52, 0.42));
     stage.finish()
 }
 
-/// Apron, taxiway and runway with their markings, each a little above what it lies on.
+/// Apron, taxiway and runway with their markings, each a little above the surface below it.
 fn pavement(stage: &mut Stage, length: f32, width: f32, reach: f32) {
     let flat = |b: &mut MeshBuilder, x: [f32; 2], z: [f32; 2], y: f32| {
         let corner = Vec3::new(x[0], y, z[0]);
@@ -98,7 +99,7 @@ fn pavement(stage: &mut Stage, length: f32, width: f32, reach: f32) {
     stage.set(b, yellow);
 }
 
-/// Parts of each kind of plane; wheels at y = 0, nose towards −z.
+/// The parts of each kind of plane, with wheels at y = 0 and the nose towards −z.
 fn planes(stage: &mut Stage) -> Vec<Vec<Shape>> {
     let dark = stage.paint("rubber and iron", [0.03, 0.03, 0.035]);
     let glass = stage.paint("canopy", [0.04, 0.07, 0.10]);
@@ -127,7 +128,7 @@ fn airframe(is_biplane: bool) -> MeshBuilder {
     b.surface([28, 40], |u, v| {
         let v = v.clamp(0.0, 1.0);
         let (sin, cos) = (u * TAU).sin_cos();
-        // Blunt nose, slender tail.
+        // The nose is blunt and the tail slender.
         let girth = (v * 9.0).min(1.0).sqrt()
             * (1.0 - 0.80 * ((v - 0.22) / 0.78).clamp(0.0, 1.0).powf(1.4));
         let end = ((1.0 - v) * 40.0).min(1.0).sqrt();
@@ -234,7 +235,7 @@ fn canopy() -> MeshBuilder {
     b
 }
 
-/// Struts and crossed wires between a biplane's wings, its windscreen's frame.
+/// Struts and crossed wires between the wings of a biplane, and the frame of its windscreen.
 fn biplane_wires() -> MeshBuilder {
     let mut b = MeshBuilder::new();
     for side in [-1.0, 1.0] {
@@ -267,7 +268,7 @@ fn hangar() -> MeshBuilder {
         let (sin, cos) = (a * PI).sin_cos();
         Vec3::new((HALF + grow) * cos, (HEIGHT + grow) * sin, 0.0)
     };
-    // Outside and inside.
+    // The outer and the inner surface.
     b.surface([32, 8], |u, v| arc(u, 0.15) + Vec3::Z * (22.0 * v - 11.0));
     b.surface([32, 8], |u, v| arc(1.0 - u, 0.0) + Vec3::Z * (22.0 * v - 11.0));
     for k in 0..8 {

@@ -1,23 +1,24 @@
-//! Built-in scenes whose shadows have a closed form, and that form.
+//! Built-in scenes whose shadows have a closed form, and the closed forms.
 //!
-//! All stand on the ground plane y = 0, a square of half-width [`GROUND_HALF`] around the origin.
-//! Ground points are metres in world space; `light_direction` is the way directional light travels
-//! and must point down (y < 0). On the shadow's very outline either answer is right.
+//! All objects stand on the ground plane y = 0, a square of half-width [`GROUND_HALF`] around the
+//! origin. Ground points are in world space, metres. `light_direction` is the way that directional
+//! light travels and must point down (y < 0). On the outline of a shadow, either answer is right.
 
 use super::mesh_builder::MeshBuilder;
 use super::stage::{Lens, Stage};
 use crate::types::Scene;
 use glam::{DVec2, DVec3, Vec3};
 
-/// Half the ground's width, metres, in all three scenes.
+/// Half the width of the ground, metres, in all three scenes.
 pub const GROUND_HALF: f64 = 20.0;
 
-/// Half the width of the square `pole`, metres; its axis is the y axis, its sides face x and z.
+/// Half the width of the square `pole`, metres. Its axis is the y axis, and its sides face x and z.
 pub const POLE_HALF_WIDTH: f64 = 0.1;
-/// Height of the `pole`, metres; it stands on the ground.
+/// Height of the `pole`, metres. The pole stands on the ground.
 pub const POLE_HEIGHT: f64 = 4.0;
 
-/// Half the width, metres, of the square screen of `slit`, a horizontal sheet without thickness.
+/// Half the width of the square screen of `slit`, metres. The screen is horizontal and has no
+/// thickness.
 pub const SCREEN_HALF: f64 = 4.0;
 /// Height of the screen of `slit` above the ground, metres.
 pub const SCREEN_HEIGHT: f64 = 2.0;
@@ -31,12 +32,13 @@ pub const SPHERE_RADIUS: f64 = 1.0;
 /// Centre of the `sphere`, metres.
 pub const SPHERE_CENTER: DVec3 = DVec3::new(0.0, 2.0, 0.0);
 
-/// Whether the pole's shadow covers a ground point: the square of [`POLE_HALF_WIDTH`] swept along
-/// the horizontal way that light travels while it falls by [`POLE_HEIGHT`].
+/// Whether the pole's shadow covers a ground point. The shadow is the square of half-width
+/// [`POLE_HALF_WIDTH`] swept along the horizontal distance that light travels while it falls by
+/// [`POLE_HEIGHT`].
 pub fn pole_shadows(ground_point: DVec3, light_direction: DVec3) -> bool {
     let sweep = horizontal_travel(light_direction, POLE_HEIGHT);
     let p = DVec2::new(ground_point.x, ground_point.z);
-    // Slabs: the part of the sweep, in [0, 1], during which p lies in the moving square.
+    // The interval of the sweep, in [0, 1], during which the moving square contains p (slab test).
     let mut span = (0.0_f64, 1.0_f64);
     for (p, travel) in [(p.x, sweep.x), (p.y, sweep.y)] {
         let (lo, hi) = (p - POLE_HALF_WIDTH, p + POLE_HALF_WIDTH);
@@ -52,8 +54,8 @@ pub fn pole_shadows(ground_point: DVec3, light_direction: DVec3) -> bool {
     span.0 <= span.1
 }
 
-/// Whether the screen's shadow covers a ground point: where light comes from lies on the screen of
-/// [`SCREEN_HALF`] at [`SCREEN_HEIGHT`], but not in the slit.
+/// Whether the screen's shadow covers a ground point: the light to the point passes the height
+/// [`SCREEN_HEIGHT`] within the screen of half-width [`SCREEN_HALF`], but not through the slit.
 pub fn slit_shadows(ground_point: DVec3, light_direction: DVec3) -> bool {
     let travel = horizontal_travel(light_direction, SCREEN_HEIGHT);
     let on_screen = (DVec2::new(ground_point.x, ground_point.z) - travel).abs();
@@ -61,12 +63,12 @@ pub fn slit_shadows(ground_point: DVec3, light_direction: DVec3) -> bool {
     on_screen.max_element() <= SCREEN_HALF && !in_slit
 }
 
-/// Whether the ideal sphere's shadow covers a ground point: light's line through the point passes
-/// [`SPHERE_CENTER`] within [`SPHERE_RADIUS`]. The outline is an ellipse.
+/// Whether the ideal sphere's shadow covers a ground point: the line of light through the point
+/// passes [`SPHERE_CENTER`] at a distance of at most [`SPHERE_RADIUS`]. The outline is an ellipse.
 ///
-/// The tessellated scene of size n is inscribed: its shadow's outline lies inside the ideal one, by
-/// less than (π/2n)²·r across the light (r the radius), and by that over the sine of the light's
-/// elevation on the ground.
+/// The tessellated scene of size n is inscribed in the sphere. The outline of its shadow lies
+/// inside the ideal one, by less than (π/2n)²·r across the light (r is the radius) and, on the
+/// ground, by that over the sine of the light's elevation.
 pub fn sphere_shadows(ground_point: DVec3, light_direction: DVec3) -> bool {
     let d = light_direction.normalize();
     (SPHERE_CENTER - ground_point).cross(d).length() <= SPHERE_RADIUS

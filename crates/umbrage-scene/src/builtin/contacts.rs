@@ -3,15 +3,18 @@ use super::stage::{Lens, Stage};
 use crate::types::Scene;
 use glam::{DVec3, Vec3};
 
-/// Half the ground's width, metres.
+/// Half the width of the ground, metres.
 const HALF: f32 = 6.0;
-/// Heights of the squares and of the slanted board's far end, metres.
+/// Height of the low square, metres.
 const LOW: f32 = 0.45;
+/// Height of the high square, metres.
 const HIGH: f32 = 1.35;
+/// Height of the raised end of the board, metres.
 const SLANT: f32 = 1.5;
 
-/// Two squares over a plane, one high and one low, and a board that rises from where it touches the plane, after Fig. 6 of Annen et al. 2007: how near an
-/// occluder may be and still cast a full shadow.
+/// Two squares over a plane, one high and one low, and a board that rises from the plane, which it
+/// touches. After Fig. 6 of Annen et al. 2007, which shows how near an occluder may be to a
+/// receiver and still cast a full shadow.
 pub(super) fn contacts(size: u32) -> Scene {
     let mut stage = Stage::new("contacts");
     let ground = stage.paint("ground", [0.62, 0.60, 0.55]);

@@ -4,11 +4,11 @@ use crate::types::Scene;
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::TAU;
 
-/// Metres between frames, and along the fence.
+/// Distance between the frames, and along the fence, metres.
 const SPACING: f64 = 3.4;
 
 /// An iron fence before `size` rows of climbing frames, ladders and wire globes, after Fig. 9 of
-/// Lloyd et al. 2006 (CSM theory): from the light, dozens of surfaces lie behind each other.
+/// Lloyd et al. 2006 (CSM theory). From the light, dozens of surfaces lie behind each other.
 pub(super) fn fence(size: u32) -> Scene {
     let mut stage = Stage::new("fence");
     let columns = size.max(8);

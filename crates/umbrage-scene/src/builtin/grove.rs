@@ -5,7 +5,7 @@ use crate::types::Scene;
 use glam::{DVec3, Vec3};
 use std::f32::consts::TAU;
 
-/// Metres between trees before they are moved about.
+/// Distance between the trees before each is displaced at random, metres.
 const SPACING: f64 = 5.6;
 
 /// `size` trees of five kinds along a winding path.
@@ -23,7 +23,7 @@ pub(super) fn grove(size: u32) -> Scene {
     trail.surface([12, 240], |u, v| {
         let z = (0.5 - v) * 2.0 * reach;
         let x = path(f64::from(z)) as f32 + (u - 0.5) * 2.4;
-        // Sunk into the grass at its edges.
+        // The edges of the trail are sunk into the grass.
         ground(Vec3::new(x, 0.0, z)) + Vec3::Y * (0.03 - 0.16 * (u - 0.5).powi(2))
     });
     stage.set(trail, earth);
@@ -47,7 +47,7 @@ pub(super) fn grove(size: u32) -> Scene {
         let (column, row) = (f64::from(k) % columns, (f64::from(k) / columns).floor());
         let moved = |vary: &mut Variation| f64::from(vary.range(-0.33, 0.33)) * SPACING;
         let mut foot = DVec3::new(at(column) + moved(&mut vary), 0.0, at(row) + moved(&mut vary));
-        // Clear of the path.
+        // Trees keep clear of the path.
         let from_path = foot.x - path(foot.z);
         if from_path.abs() < 2.6 {
             foot.x += 2.6_f64.copysign(from_path) - from_path;
@@ -83,15 +83,15 @@ pub(super) fn grove(size: u32) -> Scene {
     stage.finish()
 }
 
-/// x of the path's middle.
+/// The x coordinate of the middle of the path.
 fn path(z: f64) -> f64 {
     2.2 * (z / 11.0).sin()
 }
 
-/// The point of the rolling ground above or below a point.
+/// The point of the rolling ground that lies above or below `p`.
 fn ground(p: Vec3) -> Vec3 {
     let roll = 0.45 * (p.x / 9.0).sin() * (p.z / 12.0).cos() + 0.12 * (p.x / 3.1 + p.z / 4.3).sin();
-    // Trodden flat along the path.
+    // The ground is flat along the path.
     let trodden = 1.0 - (-((p.x - path(f64::from(p.z)) as f32) / 2.0).powi(2)).exp();
     p.with_y(roll * (0.3 + 0.7 * trodden) - 0.12 * (1.0 - trodden))
 }

@@ -1,4 +1,4 @@
-//! A hall that only a lantern lights: all sides of the cube around the light have something to show.
+//! A hall that is lit by a lantern alone. Every side of the cube around the light shows surfaces.
 
 use super::mesh_builder::MeshBuilder;
 use super::stage::{Lens, Paint, Stage, Variation, standing};
@@ -7,17 +7,18 @@ use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 use umbrage::PointLight;
 
-/// Metres between columns.
+/// Distance between columns, metres.
 const SPACING: f32 = 3.6;
-/// Metres, of the ceiling and of the beams' lower edge: the columns' height.
+/// Height of the ceiling, metres.
 const CEILING: f32 = 4.9;
+/// Height of the beams' lower edge, metres, which is the height of the columns.
 const BEAMS: f32 = 4.45;
-/// The flame.
+/// Position of the flame, metres.
 const FLAME: Vec3 = Vec3::new(0.0, 2.35, 0.0);
-/// Radius of the lantern's belly, and half its height.
+/// Radius of the lantern's belly, and half its height, metres.
 const CAGE: [f32; 2] = [0.27, 0.36];
 
-/// A hall of 2 `size` + 1 columns along each side; the lantern hangs where the middle one would stand.
+/// A hall of 2 `size` + 1 columns along each side. The lantern hangs in place of the middle column.
 pub(super) fn lantern(size: u32) -> Scene {
     let mut stage = Stage::new("lantern");
     let half = (size as f32 + 0.75) * SPACING;
@@ -101,7 +102,7 @@ fn column() -> MeshBuilder {
     b
 }
 
-/// Jars, bowls and stools between the columns, but where someone stands or would see nothing else.
+/// Jars, bowls and stools between the columns, except near `eye`, where they would hide all else.
 fn furnish(stage: &mut Stage, size: u32, eye: DVec3) {
     let clay = stage.paint("clay", [0.46, 0.20, 0.10]);
     let glaze = stage.paint("glaze", [0.10, 0.27, 0.30]);
@@ -145,7 +146,7 @@ fn furnish(stage: &mut Stage, size: u32, eye: DVec3) {
     }
 }
 
-/// Four legs, rails, and slats that light falls between.
+/// Four legs, rails, and slats with gaps through which light falls.
 fn stool() -> MeshBuilder {
     let mut b = MeshBuilder::new();
     for (x, z) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
@@ -162,11 +163,12 @@ fn stool() -> MeshBuilder {
     b
 }
 
-/// Wire wound both ways around the flame, rings, a foot for the candle, and a chain up to the beams.
+/// Wire wound in both directions around the flame, rings, a foot for the candle, and a chain up to
+/// the beams.
 fn cage() -> MeshBuilder {
     const STRANDS: u32 = 13;
     let [belly, reach] = CAGE;
-    // From pole to pole but for the openings below and above.
+    // The wire runs from pole to pole, except for the openings at the bottom and the top.
     let shape = |v: f32| {
         let a = PI * (0.09 + 0.82 * v);
         (belly * a.sin(), FLAME.y - reach * a.cos())
@@ -200,7 +202,7 @@ fn cage() -> MeshBuilder {
         let (sin, cos) = (TAU * k as f32 / 4.0).sin_cos();
         b.bar(Vec3::new(neck * cos, top, neck * sin), Vec3::Y * (top + 0.12), 0.004, 6);
     }
-    // Links across each other, each through the next.
+    // Neighbouring links are perpendicular and pass through each other.
     let links = ((BEAMS - top - 0.10) / 0.07) as u32;
     for k in 0..=links {
         let normal = if k % 2 == 0 { Vec3::X } else { Vec3::Z };
@@ -210,7 +212,7 @@ fn cage() -> MeshBuilder {
     b
 }
 
-/// A candle that ends below its flame.
+/// A candle whose top is below the flame.
 fn candle() -> MeshBuilder {
     let foot = FLAME.y - CAGE[1] * (PI * 0.09).cos();
     let mut b = MeshBuilder::new();

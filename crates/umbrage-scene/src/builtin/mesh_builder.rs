@@ -2,7 +2,7 @@ use crate::types::Mesh;
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
 use std::f32::consts::TAU;
 
-/// Collects triangles of one mesh. Everything added faces outwards and has unit normals.
+/// Collects the triangles of one mesh. All surfaces face outwards and have unit normals.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeshBuilder {
     mesh: Mesh,
@@ -17,12 +17,13 @@ impl MeshBuilder {
         Mesh { material, ..self.mesh }
     }
 
-    /// A copy of `other`, moved. Mirroring transforms keep the outside outside.
+    /// Adds a transformed copy of `other`. Under mirroring transforms too, surfaces keep facing
+    /// outwards.
     pub(super) fn add(&mut self, other: &Self, self_from_other: Affine3A) -> &mut Self {
         let (from, m) = (&other.mesh, self_from_other.matrix3);
         let base = self.mesh.positions.len() as u32;
         let mirrored = m.determinant() < 0.0;
-        // Directions of planes transform by the cofactor matrix, whatever the scale or mirroring.
+        // Normals transform by the cofactor matrix, whatever the scale or mirroring.
         let sign = if mirrored { -1.0 } else { 1.0 };
         let cofactor = Mat3A::from_cols(
             m.y_axis.cross(m.z_axis),
@@ -39,14 +40,14 @@ impl MeshBuilder {
         self
     }
 
-    /// The parallelogram `corner + i·u + j·v`, facing u × v, in `cells` × `cells` quads.
+    /// Adds the parallelogram `corner + i·u + j·v`, facing u × v, in `cells` × `cells` quads.
     pub(super) fn sheet(&mut self, corner: Vec3, u: Vec3, v: Vec3, cells: u32) -> &mut Self {
         let normal = u.cross(v).normalize();
         self.grid([cells, cells], |i, j| (corner + u * i + v * j, normal));
         self
     }
 
-    /// A box with sharp edges, each side in `cells` × `cells` quads.
+    /// Adds a box with sharp edges, each side in `cells` × `cells` quads.
     pub(super) fn cuboid(&mut self, min: Vec3, max: Vec3, cells: u32) -> &mut Self {
         let d = max - min;
         let (x, y, z) = (Vec3::X * d.x, Vec3::Y * d.y, Vec3::Z * d.z);
@@ -58,7 +59,7 @@ impl MeshBuilder {
             .sheet(min + z, x, y, cells)
     }
 
-    /// A box standing on y = 0 around the axis, then moved.
+    /// Adds a box that stands on y = 0 around the y axis, transformed.
     pub(super) fn block(&mut self, size: Vec3, self_from_block: Affine3A) -> &mut Self {
         let mut b = Self::new();
         let half = Vec3::new(size.x / 2.0, 0.0, size.z / 2.0);
@@ -66,8 +67,9 @@ impl MeshBuilder {
         self.add(&b, self_from_block)
     }
 
-    /// The profile (radius, height), from bottom to top, turned about the y axis. Sharp at the
-    /// profile's points, smooth around the axis; points of radius 0 close it.
+    /// Adds the surface that a profile of points (radius, height), from bottom to top, sweeps
+    /// around the y axis. Its normals are sharp at the points of the profile and smooth around the
+    /// axis. Points of radius 0 close the surface.
     pub(super) fn lathe(&mut self, profile: &[Vec2], sides: u32) -> &mut Self {
         for pair in profile.windows(2) {
             let (lo, hi) = (pair[0], pair[1]);
@@ -77,7 +79,7 @@ impl MeshBuilder {
                 continue;
             }
             self.grid([sides, 1], |u, v| {
-                // Clockwise seen from above, so that u × v points outwards.
+                // Clockwise as seen from above, so that u × v points outwards.
                 let (sin, cos) = turn(-u);
                 let p = lo.lerp(hi, v);
                 let normal = Vec3::new(slope.x * cos, slope.y, slope.x * sin);
@@ -87,14 +89,14 @@ impl MeshBuilder {
         self
     }
 
-    /// A smooth closed-or-open parametric surface; outwards is ∂u × ∂v.
+    /// Adds a smooth parametric surface, closed or open. Its outer side is that of ∂u × ∂v.
     pub(super) fn surface(&mut self, cells: [u32; 2], f: impl Fn(f32, f32) -> Vec3) -> &mut Self {
-        // Wide enough that differences of single precision keep three good digits.
+        // The step is large enough for differences in single precision to keep three good digits.
         const H: f32 = 2e-3;
         self.grid(cells, |u, v| {
             let du = f(u + H, v) - f(u - H, v);
             let dv = f(u, v + H) - f(u, v - H);
-            // At a pole one of the two vanishes: look a little beside it.
+            // At a pole one of the two derivatives vanishes, so they are taken a little beside it.
             let normal = du.cross(dv).try_normalize().unwrap_or_else(|| {
                 let w = if v < 0.5 { v + 0.01 } else { v - 0.01 };
                 let du = f(u + H, w) - f(u - H, w);
@@ -105,7 +107,7 @@ impl MeshBuilder {
         self
     }
 
-    /// A sphere of `rings` rings and twice as many sectors; all its corners lie on the sphere.
+    /// Adds a sphere of `rings` rings and twice as many sectors; all its corners lie on the sphere.
     pub(super) fn ball(&mut self, center: Vec3, radius: f32, rings: u32) -> &mut Self {
         let rings = rings.max(2);
         self.grid([2 * rings, rings], |u, v| {
@@ -117,11 +119,11 @@ impl MeshBuilder {
         self
     }
 
-    /// A round tube along `path` with a radius at each of its points; open at both ends.
+    /// Adds a round tube along `path`, with a radius at each of its points. Both ends are open.
     pub(super) fn tube(&mut self, path: &[Vec3], radii: &[f32], sides: u32) -> &mut Self {
         let last = path.len() - 1;
         let tangent = |i: usize| (path[(i + 1).min(last)] - path[i.saturating_sub(1)]).normalize();
-        // A frame carried along without twisting about the path.
+        // A frame that is carried along the path without twisting around it.
         let mut across = Vec::with_capacity(path.len());
         for i in 0..path.len() {
             let t = tangent(i);
@@ -137,7 +139,8 @@ impl MeshBuilder {
         self
     }
 
-    /// A ring around `center` in the plane across `normal`; `cells` along and around the tube.
+    /// Adds a ring around `center`, in the plane perpendicular to `normal`. `cells` are the numbers
+    /// of quads along the ring and around its tube.
     pub(super) fn torus(
         &mut self,
         center: Vec3,
@@ -158,8 +161,9 @@ impl MeshBuilder {
         self
     }
 
-    /// A wing from the origin along +x, its leading edge towards −z: an airfoil 12% thick (NACA
-    /// 0012) that tapers from the first `chord` to the second and rises by `rise` a metre.
+    /// Adds a wing from the origin along +x, with its leading edge towards −z. It has an airfoil
+    /// 12% thick (NACA 0012), tapers from the first `chord` to the second, and rises by `rise` per
+    /// metre.
     pub(super) fn wing(&mut self, span: f32, chord: [f32; 2], rise: f32) -> &mut Self {
         self.surface([28, 14], |u, v| {
             let v = v.clamp(0.0, 1.0);
@@ -168,7 +172,7 @@ impl MeshBuilder {
             let thickness = 0.6
                 * (0.2969 * c.sqrt() - 0.126 * c - 0.3516 * c * c + 0.2843 * c.powi(3)
                     - 0.1036 * c.powi(4));
-            // Rounded and thin at the tip.
+            // The tip is rounded and thin.
             let tip = (1.0 - v.powi(8)).max(0.0).sqrt();
             let length = (chord[0] + (chord[1] - chord[0]) * v) * (0.35 + 0.65 * tip);
             let lead = 0.25 * (chord[0] - length);
@@ -178,12 +182,12 @@ impl MeshBuilder {
         self
     }
 
-    /// A round bar between two points.
+    /// Adds a round bar between two points.
     pub(super) fn bar(&mut self, from: Vec3, to: Vec3, radius: f32, sides: u32) -> &mut Self {
         self.tube(&[from, to], &[radius; 2], sides)
     }
 
-    /// A flat convex polygon, counter-clockwise seen from the front.
+    /// Adds a flat convex polygon. Its corners run counter-clockwise as seen from the front.
     pub(super) fn polygon(&mut self, corners: &[Vec3]) -> &mut Self {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
         let base = self.mesh.positions.len() as u32;
@@ -195,7 +199,8 @@ impl MeshBuilder {
         self
     }
 
-    /// A flat convex polygon of z = 0 (counter-clockwise seen from +z) thickened to ±`half`, moved.
+    /// Adds a flat convex polygon of the plane z = 0 (counter-clockwise as seen from +z), thickened
+    /// to ±`half` and transformed.
     pub(super) fn plate(&mut self, outline: &[Vec2], half: f32, to: Affine3A) -> &mut Self {
         let mut b = Self::new();
         let at = |z: f32| outline.iter().map(|p| p.extend(z)).collect::<Vec<_>>();
@@ -209,7 +214,7 @@ impl MeshBuilder {
         self.add(&b, to)
     }
 
-    /// `cells` quads over [0, 1]² of a function that gives position and normal.
+    /// Adds `cells` quads of a surface, for which `f` gives position and normal over [0, 1]².
     fn grid(&mut self, cells: [u32; 2], f: impl Fn(f32, f32) -> (Vec3, Vec3)) {
         let [nu, nv] = cells;
         let base = self.mesh.positions.len() as u32;
@@ -226,7 +231,8 @@ impl MeshBuilder {
                 let c = a + nu + 1;
                 for t in [[a, a + 1, c + 1], [a, c + 1, c]] {
                     let [p, q, r] = t.map(|k| self.mesh.positions[k as usize]);
-                    // The tips of cones and poles of spheres close with single triangles.
+                    // At the tips of cones and the poles of spheres, one triangle of the quad has
+                    // no area.
                     if p != q && q != r && r != p {
                         self.mesh.triangles.push(t);
                     }
@@ -242,8 +248,8 @@ impl MeshBuilder {
     }
 }
 
-/// Sine and cosine of a fraction of a full turn, exact where they are 0, so that seams close and
-/// tips are points.
+/// Sine and cosine of a fraction of a full turn. They are exact where they are 0, so that seams
+/// close and tips are points.
 fn turn(fraction: f32) -> (f32, f32) {
     let exact = |x: f32| if x.abs() < 1e-6 { 0.0 } else { x };
     let (sin, cos) = (fraction.fract() * TAU).sin_cos();

@@ -1,4 +1,4 @@
-//! Scenes made by rule.
+//! Built-in scenes, generated procedurally.
 
 mod airfield;
 pub mod closed_form;
@@ -15,19 +15,19 @@ mod town;
 use crate::error::SceneError;
 use crate::types::Scene;
 
-/// A built-in scene, as lists show it.
+/// A description of a built-in scene, for lists.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct BuiltinInfo {
-    /// To ask for it by.
+    /// The name that selects the scene.
     pub name: &'static str,
-    /// What it shows, in one sentence.
+    /// What the scene shows, in one sentence.
     pub about: &'static str,
-    /// What the size counts.
+    /// What the size of the scene counts.
     pub size_means: &'static str,
-    /// Quick to build and worth looking at.
+    /// The size by default, quick to build and rich enough to look at.
     pub default_size: u32,
-    /// The largest, many millions of triangles drawn.
+    /// The largest valid size, which draws many millions of triangles.
     pub max_size: u32,
     build: fn(u32) -> Scene,
 }
@@ -120,12 +120,12 @@ pub fn builtins() -> &'static [BuiltinInfo] {
     BUILTINS
 }
 
-/// A built-in scene: deterministic, with its own camera and light. `size` is 1 to
-/// [`BuiltinInfo::max_size`] and counts what [`BuiltinInfo::size_means`] says; `None` is
-/// [`BuiltinInfo::default_size`].
+/// A built-in scene with its own camera and light. The same arguments always give the same scene.
+/// `size` is 1 to [`BuiltinInfo::max_size`] and counts what [`BuiltinInfo::size_means`] says;
+/// `None` stands for [`BuiltinInfo::default_size`].
 ///
 /// # Errors
-/// An unknown name (the error gives the nearest valid one) or a size out of range.
+/// The name is unknown (the error gives the most similar valid one), or the size is out of range.
 pub fn builtin(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
     let Some(info) = BUILTINS.iter().find(|b| b.name == name) else {
         let distance = |b: &&BuiltinInfo| strsim::damerau_levenshtein(b.name, name);

@@ -6,24 +6,24 @@ use crate::types::{Texture, Wrap};
 use glam::{DVec3, Quat, Vec2, Vec3};
 use std::f32::consts::TAU;
 
-/// How a kind of tree grows. Lengths in metres.
+/// How a kind of tree grows. Lengths are in metres.
 #[derive(Clone, Copy)]
 pub(super) struct Habit {
     pub(super) trunk: f32,
     pub(super) radius: f32,
-    /// Children of a trunk, a limb, a branch.
+    /// Number of children of the trunk, of a limb, and of a branch.
     pub(super) children: [u32; 3],
-    /// How far children lean away from their parent, radians.
+    /// Angle between a child and its parent, radians.
     pub(super) spread: f32,
-    /// Length of a child over its parent's.
+    /// Ratio of a child's length to its parent's.
     pub(super) shrink: f32,
-    /// Leaf cards on a twig; 0 for winter trees.
+    /// Number of leaf cards on a twig; 0 for winter trees.
     pub(super) leaves: u32,
-    /// Width of a leaf card.
+    /// Width of a leaf card, metres.
     pub(super) leaf: f32,
 }
 
-/// A spreading crown.
+/// An oak, with a spreading crown.
 pub(super) const OAK: Habit = Habit {
     trunk: 3.4,
     radius: 0.26,
@@ -34,7 +34,7 @@ pub(super) const OAK: Habit = Habit {
     leaf: 0.46,
 };
 
-/// Tall and slender.
+/// A birch, tall and slender.
 pub(super) const BIRCH: Habit = Habit {
     trunk: 6.4,
     radius: 0.15,
@@ -45,11 +45,11 @@ pub(super) const BIRCH: Habit = Habit {
     leaf: 0.34,
 };
 
-/// Leafless, all thin branches.
+/// A leafless tree with many thin branches.
 pub(super) const WINTER: Habit =
     Habit { children: [9, 7, 6], leaves: 0, trunk: 3.0, radius: 0.22, ..OAK };
 
-/// A kind of tree on a stage.
+/// A kind of tree, as shapes that a stage can place.
 #[derive(Clone, Copy)]
 pub(super) struct Tree {
     wood: Shape,
@@ -120,7 +120,8 @@ impl Grower<'_> {
         for k in 0..n {
             let t = first + (1.0 - first) * (k as f32 + self.vary.range(0.3, 0.9)) / n as f32;
             let (place, forward) = at(t.min(0.99));
-            // Around the parent by the golden angle, leaning less towards its tip.
+            // Children surround the parent by steps of the golden angle, and lean less towards the
+            // parent's tip.
             let around = Quat::from_axis_angle(forward, turn + 2.399_963 * k as f32);
             let lean = self.habit.spread * self.vary.range(0.8, 1.2) * (1.25 - 0.6 * t);
             let side = around * forward.any_orthonormal_vector();
@@ -144,12 +145,12 @@ impl Grower<'_> {
     }
 }
 
-/// A sprig of pointed leaves on a transparent ground, its stem running from v = 1 up.
+/// A sprig of pointed leaves on a transparent background. Its stem rises from v = 1.
 pub(super) fn leaf_texture(tint: Vec3) -> Texture {
     const N: u32 = 192;
     let leaf = |p: Vec2, base: Vec2, angle: f32, length: f32| {
         let q = Vec2::from_angle(-angle).rotate(p - base) / length;
-        // Half-width of a leaf of unit length at q.x.
+        // Half the width of a leaf of unit length at q.x.
         let half = 0.30 * (q.x * (1.0 - q.x)).max(0.0).powf(0.72) * (1.35 - 0.7 * q.x);
         ((half - q.y.abs()) * length, q)
     };
@@ -169,7 +170,8 @@ pub(super) fn leaf_texture(tint: Vec3) -> Texture {
             }
         }
         let color = (tint * shade).clamp(Vec3::ZERO, Vec3::ONE) * 255.0;
-        // One pixel of ramp: the mask's edge is where the leaf's is.
+        // Alpha ramps over one pixel and is one half at the outline of the leaf, where the mask
+        // cuts.
         let alpha = (inside * N as f32 + 0.5).clamp(0.0, 1.0) * 255.0;
         [color.x as u8, color.y as u8, color.z as u8, alpha as u8]
     };

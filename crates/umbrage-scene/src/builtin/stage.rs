@@ -36,7 +36,7 @@ impl Stage {
         })
     }
 
-    /// A material seen from both sides and cut out by a texture's alpha at one half.
+    /// A material that is visible from both sides, and that a texture's alpha cuts out at one half.
     pub(super) fn cut_out(&mut self, name: &str, texture: Texture) -> Paint {
         self.scene.textures.push(texture);
         self.material(Material {
@@ -62,7 +62,7 @@ impl Stage {
         self.scene.instances.push(Instance { mesh: shape.0, world_from_mesh });
     }
 
-    /// A shape that stands just once, where it was built.
+    /// Adds a shape with a single instance, in the space that it was built in.
     pub(super) fn set(&mut self, builder: MeshBuilder, paint: Paint) {
         let shape = self.shape(builder, paint);
         self.place(shape, DAffine3::IDENTITY);
@@ -109,7 +109,7 @@ impl Stage {
     }
 }
 
-/// How a camera of a [`Stage`] sees. Depths in metres.
+/// The lens of a camera of a [`Stage`]. Distances are in metres.
 #[derive(Clone, Copy)]
 pub(super) struct Lens {
     pub(super) fov_y_deg: f64,
@@ -117,7 +117,8 @@ pub(super) struct Lens {
     pub(super) far: f64,
 }
 
-/// A turn about the vertical (counter-clockwise from above, radians), a uniform scale, a place.
+/// A rotation about the vertical (counter-clockwise as seen from above, radians), after a uniform
+/// scale and before a translation to `at`.
 pub(super) fn standing(at: DVec3, yaw_rad: f64, scale: f64) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(
         DVec3::splat(scale),
@@ -126,7 +127,7 @@ pub(super) fn standing(at: DVec3, yaw_rad: f64, scale: f64) -> DAffine3 {
     )
 }
 
-/// Numbers that look random and are the same on every machine (SplitMix64; Steele et al. 2014).
+/// Pseudorandom numbers that are the same on every machine (SplitMix64; Steele et al. 2014).
 pub(super) struct Variation(u64);
 
 impl Variation {
@@ -134,7 +135,7 @@ impl Variation {
         Self(seed)
     }
 
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub(super) fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -142,12 +143,12 @@ impl Variation {
         ((z ^ z >> 31) >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    /// In [lo, hi).
+    /// A number in [lo, hi).
     pub(super) fn range(&mut self, lo: f32, hi: f32) -> f32 {
         lo + (hi - lo) * self.unit()
     }
 
-    /// One of 0 .. `n`.
+    /// An index in 0 .. `n`.
     pub(super) fn pick(&mut self, n: usize) -> usize {
         ((self.unit() * n as f32) as usize).min(n - 1)
     }

@@ -1,4 +1,5 @@
-//! Ornate objects, evenly spaced on a plane, after the 25 dragons of Lloyd et al. 2006 (CSM theory).
+//! Ornate objects, evenly spaced on a plane, after the 25 dragons of Lloyd et al. 2006 (CSM
+//! theory).
 
 use super::mesh_builder::MeshBuilder;
 use super::stage::{Lens, Shape, Stage, Variation, standing};
@@ -6,7 +7,7 @@ use crate::types::Scene;
 use glam::{Affine3A, DVec3, Mat3, Quat, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
-/// Metres between neighbours.
+/// Distance between neighbours, metres.
 const SPACING: f64 = 3.2;
 const PLINTH_HEIGHT: f32 = 0.9;
 
@@ -36,7 +37,7 @@ pub(super) fn statues(size: u32) -> Scene {
             let foot = DVec3::new(at(column), 0.0, at(row));
             let quarter = f64::from(vary.unit() * TAU);
             stage.place(plinth, standing(foot, 0.0, 1.0));
-            // Diagonals of one kind: no two neighbours are alike.
+            // Statues of one kind stand along diagonals, so that no two neighbours are alike.
             let kind = kinds[((column + 2 * row) % 4) as usize];
             let top = foot + DVec3::Y * f64::from(PLINTH_HEIGHT);
             stage.place(kind, standing(top, quarter, 1.0));
@@ -50,7 +51,7 @@ pub(super) fn statues(size: u32) -> Scene {
     stage.finish()
 }
 
-/// A square foot, a turned shaft with mouldings, a round cap.
+/// A square foot, a turned shaft with mouldings, and a round cap.
 fn plinth() -> MeshBuilder {
     let mut b = MeshBuilder::new();
     b.cuboid(Vec3::new(-0.52, 0.0, -0.52), Vec3::new(0.52, 0.12, 0.52), 1);
@@ -75,7 +76,7 @@ fn plinth() -> MeshBuilder {
 
 /// A trefoil knot of three-stranded rope, standing on its edge.
 fn rope_knot() -> MeshBuilder {
-    // High enough to touch its plinth with the outer of its three lobes.
+    // At this height, the outer one of its three lobes touches the plinth.
     const CENTER: Vec3 = Vec3::new(0.0, 0.80, 0.0);
     let middle = |v: f32| {
         let a = (v + 0.25) * TAU;
@@ -89,14 +90,14 @@ fn rope_knot() -> MeshBuilder {
         let side = forward.cross(outward).normalize();
         let outward = side.cross(forward);
         let a = u * TAU;
-        // Strands wind 20 times around the rope while it closes.
+        // The strands wind 20 times around the rope before it closes.
         let radius = 0.105 * (1.0 + 0.22 * (3.0 * a + 20.0 * TAU * v).cos());
         middle(v) + (outward * a.cos() - side * a.sin()) * radius
     });
     b
 }
 
-/// Strands that cross each other on the shape of a vase: more holes than wall.
+/// Strands that cross each other in the shape of a vase, with more holes than wall.
 fn woven_vase() -> MeshBuilder {
     const STRANDS: u32 = 6;
     let profile = |v: f32| {
@@ -109,7 +110,7 @@ fn woven_vase() -> MeshBuilder {
                 .map(|i| {
                     let v = i as f32 / 90.0;
                     let a = TAU * (k as f32 / STRANDS as f32 + 0.55 * hand * v);
-                    // Over and under where strands meet.
+                    // Where strands meet, one passes over the other.
                     let weave = 0.022 * hand * (TAU * STRANDS as f32 * 1.1 * v).cos();
                     let r = profile(v) + weave;
                     Vec3::new(r * a.cos(), 0.03 + 1.45 * v, r * a.sin())

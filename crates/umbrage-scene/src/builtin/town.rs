@@ -6,21 +6,23 @@ use glam::{Affine3A, DVec3, Quat, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::f64::consts::FRAC_PI_2;
 
-/// Metres of street front that a house has, on average.
+/// Average length of street front per house, metres.
 const FRONT: f64 = 11.0;
-/// Half the street's width, and where houses begin.
+/// Half the width of the carriageway, metres.
 const KERB: f32 = 4.2;
+/// Distance of the facades from the middle of the street, metres.
 const FACADE: f64 = 7.4;
 
-/// A street of `size` pairs of houses, some hundred metres deep, after the town of Wimmer et al. 2004
-/// (LiSPSM): lamps, trees and wires near by, roofs and a church far off.
+/// A street of `size` pairs of houses, some hundred metres deep, after the town of Wimmer et al.
+/// 2004 (LiSPSM). Lamps, trees and wires are near, roofs and a church far away.
 pub(super) fn town(size: u32) -> Scene {
     let mut stage = Stage::new("town");
     let length = f64::from(size) * FRONT;
     street(&mut stage, length as f32);
     let kinds = houses(&mut stage);
     let mut vary = Variation::new(11);
-    // Second rows stand behind gardens and show their gables between the first.
+    // Houses of a second row stand behind gardens, and their gables show between the houses of the
+    // first.
     for (offset, is_first) in [(FACADE, true), (FACADE + 26.0, false)] {
         for side in [-1.0, 1.0] {
             let mut z = if is_first { 6.0 } else { 1.0 };
@@ -110,7 +112,7 @@ struct Plan {
     width: f32,
     depth: f32,
     storeys: u32,
-    /// Rise of the roof over its run.
+    /// Slope of the roof: its rise over its run.
     pitch: f32,
 }
 
@@ -136,7 +138,7 @@ impl Plan {
             Vec2::new(0.0, self.ridge() - 0.05),
         ];
         for x in [-w + 0.1, w - 0.1] {
-            // The plate's x axis along the house's depth.
+            // The rotation takes the plate's x axis to the depth of the house.
             let turned = Quat::from_rotation_y(FRAC_PI_2 as f32);
             b.plate(&gable, 0.1, Affine3A::from_rotation_translation(turned, Vec3::X * x));
         }
@@ -148,7 +150,7 @@ impl Plan {
         b
     }
 
-    /// Two slopes with an overhang, a ridge, dormers, gutters, chimney pots.
+    /// Two slopes with an overhang, a ridge, dormers, gutters, and chimney pots.
     fn roof(self) -> MeshBuilder {
         let (w, d) = (self.width / 2.0 + 0.25, self.depth / 2.0);
         let mut b = MeshBuilder::new();
@@ -156,7 +158,7 @@ impl Plan {
         let slope = Vec2::new(d, self.pitch * d).normalize();
         let length = run / slope.x;
         for side in [-1.0_f32, 1.0] {
-            // A slab from the ridge down; its local y points up the slope.
+            // A slab that slopes down from the ridge; its local y axis points up the slope.
             let lean = Quat::from_rotation_x(-side * (FRAC_PI_2 as f32 - slope.y.atan2(slope.x)));
             let foot = Vec3::new(0.0, self.ridge() - self.pitch * run, side * run);
             b.block(
@@ -197,7 +199,7 @@ impl Plan {
         (0..n).map(move |k| ((k as f32 + 0.5) / n as f32 - 0.5) * self.width)
     }
 
-    /// Middles of the windows of the front (z < 0) and back, and of the door.
+    /// Centres and sizes of the windows of the front (z < 0) and the back, and of the door.
     fn openings(self) -> Vec<(Vec3, Vec2)> {
         let columns = (self.width / 2.3) as u32;
         let door = columns / 2;
@@ -218,7 +220,7 @@ impl Plan {
         found
     }
 
-    /// Frames, sills and string courses; dormer cheeks.
+    /// Frames, sills and string courses, and the cheeks of dormers.
     fn trim(self) -> MeshBuilder {
         let mut b = MeshBuilder::new();
         let mut block = |center: Vec3, size: Vec3| {
@@ -363,7 +365,7 @@ fn wire() -> MeshBuilder {
     b
 }
 
-/// Nave, tower and spire at the street's end.
+/// Nave, tower and spire at the end of the street.
 fn church(stage: &mut Stage, foot: Vec3) {
     let stone = stage.paint("church stone", [0.46, 0.42, 0.35]);
     let copper = stage.paint("copper", [0.16, 0.34, 0.27]);

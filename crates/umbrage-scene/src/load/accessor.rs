@@ -1,4 +1,4 @@
-//! Typed arrays of a file, checked against the bytes that are there.
+//! Reads typed arrays from a file, checked against the bytes that the file contains.
 
 use super::document::Document;
 use crate::error::SceneError;
@@ -6,13 +6,15 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, buffer};
 
-/// More elements than this are refused where no bytes back them (sparse arrays of zeros).
+/// Largest number of elements that an accessor may have without bytes for them (a sparse array of
+/// zeros). Without this limit, a tiny file could demand any amount of memory.
 const MAX_IMPLIED: u64 = 1 << 26;
 
 type Id = Index<Accessor>;
 
 impl Document<'_> {
-    /// Vectors of `N` floats; integers are scaled to [0, 1] or [−1, 1] if the file says so.
+    /// Reads vectors of `N` floats. Integers are scaled to [0, 1] or [−1, 1] if the accessor is
+    /// normalized.
     pub(super) fn floats<const N: usize>(
         &self,
         id: Id,
@@ -34,7 +36,7 @@ impl Document<'_> {
         })
     }
 
-    /// Vectors of `N` whole numbers.
+    /// Reads vectors of `N` unsigned integers.
     pub(super) fn integers<const N: usize>(
         &self,
         id: Id,
@@ -114,7 +116,8 @@ impl Document<'_> {
         Ok(values)
     }
 
-    /// The bytes of each of `count` elements, `element` bytes long, of a buffer view.
+    /// The bytes of each of `count` elements of a buffer view; each element is `element` bytes
+    /// long.
     fn elements(
         &self,
         view: Index<buffer::View>,
@@ -158,7 +161,7 @@ fn unsigned(component: ComponentType, bytes: &[u8]) -> u32 {
     }
 }
 
-/// The first bytes of an element that is known to have them.
+/// The first `N` bytes of an element that is known to have at least as many.
 fn fixed<const N: usize>(bytes: &[u8]) -> [u8; N] {
     std::array::from_fn(|i| bytes[i])
 }

@@ -1,4 +1,4 @@
-//! Cameras and lights.
+//! Loads cameras and lights.
 
 use super::document::{Document, Notices};
 use crate::error::SceneError;
@@ -9,17 +9,19 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, camera};
 use umbrage::{Aabb, Light, PointLight, SpotLight};
 
-/// Widest half angle of a spot light, radians: that of [`SpotLight::half_angle_rad`].
+/// Largest half angle of a spot light's cone, radians: the limit of [`SpotLight::half_angle_rad`].
 const MAX_HALF_ANGLE_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
 
-/// Shadows of lamps begin at this share of how far they shine: a centimetre for a lamp of 10 m.
+/// Ratio of the near distance, where the shadows of a spot or point light begin, to its range: a
+/// centimetre for a range of 10 m.
 const NEAR_SHARE: f64 = 1e-3;
 
-/// Ranges of lamps, metres: those whose near distances the planner takes, and its world's end.
+/// Smallest and largest range of a spot or point light, metres. The planner accepts the near
+/// distances of these ranges, and the largest range is the end of its world.
 const RANGES: [f64; 2] = [1e-9, 1e12];
 
-/// The camera of a node, or `None` with a notice if it cannot be one of ours. `bounds` are the
-/// scene's: where they end, an endless view ends.
+/// The camera of a node, or `None` with a notice if it is not a supported camera. `bounds` are
+/// those of the scene; they end the view of a camera without a far distance.
 pub(super) fn load_camera(
     document: &Document,
     index: Index<camera::Camera>,
@@ -53,7 +55,8 @@ pub(super) fn load_camera(
     Ok(Some(SceneCamera {
         name: json.name.as_deref().or(node_name).unwrap_or_default().into(),
         eye,
-        // As far away as the view is long: the direction survives rounding anywhere.
+        // The target is as far away as the far distance, so that the direction survives rounding
+        // anywhere.
         target: eye + forward * far,
         up,
         fov_y_rad: fov,
@@ -74,7 +77,7 @@ pub(super) fn load_light(
     let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
     let lights = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
     let Some(json) = lights.and_then(|l| l.lights.get(index)) else {
-        return Err(document.invalid(&place, "does not exist, but a node shines with it"));
+        return Err(document.invalid(&place, "does not exist, but a node refers to it"));
     };
     let Checked::Valid(kind) = json.type_ else {
         return Err(document.invalid(&place, "type must be directional, point or spot"));
@@ -99,10 +102,7 @@ pub(super) fn load_light(
             };
             let outer = f64::from(cone.outer_cone_angle);
             if !(outer > 0.0 && outer <= MAX_HALF_ANGLE_RAD) {
-                notices.add(
-                    &place,
-                    "outerConeAngle must lie above 0° and at most at 85°, moved there",
-                );
+                notices.add(&place, "outerConeAngle must be above 0° and at most 85°, clamped");
             }
             let half_angle_rad = outer.clamp(1e-3, MAX_HALF_ANGLE_RAD);
             Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })
@@ -118,8 +118,9 @@ pub(super) fn load_light(
     }))
 }
 
-/// Where a lamp's shadows begin and where its light ends, metres. Without a range it shines as far as
-/// there is something: `reach` metres. A range beyond that lets no shadow begin later.
+/// The near distance, where the shadows of a spot or point light begin, and the distance where its
+/// light ends, metres. A light without a range reaches all of the scene, which extends to `reach`
+/// metres from the light. A range beyond `reach` does not make shadows begin any later.
 fn near_and_range(range: Option<f32>, reach: f64) -> [f64; 2] {
     let [least, most] = RANGES;
     let reach = reach.clamp(1e-3, most);
@@ -130,7 +131,7 @@ fn near_and_range(range: Option<f32>, reach: f64) -> [f64; 2] {
     [range.min(reach) * NEAR_SHARE, range]
 }
 
-/// The largest value that `distance` has in a box, a little rounded up.
+/// The largest value that `distance` has in a box, increased by 1%.
 fn farthest(bounds: Aabb, distance: impl Fn(DVec3) -> f64) -> f64 {
     bounds.corners().into_iter().map(distance).fold(0.0, f64::max) * 1.01
 }

@@ -7,20 +7,20 @@ use std::fmt::Display;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A scene file's JSON and the bytes it refers to.
+/// A scene file's JSON, and the bytes that it refers to.
 ///
-/// Indices of the JSON may point anywhere: the schema types of the crate `gltf` are used without
-/// its wrappers and readers, which panic on broken files. Everything is looked up through
+/// Indices in the JSON may be out of range. The crate `gltf` is used for its schema types only,
+/// because its wrappers and readers panic on invalid files. All objects are looked up through
 /// [`get`](Self::get).
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
     pub(super) root: Root,
-    /// In the order of the JSON, each at least as long as the JSON says.
+    /// In the order of the JSON. Each buffer has at least the length that the JSON states.
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
 impl<'a> Document<'a> {
-    /// `bytes` is the content of the file at `path`.
+    /// Parses `bytes`, which are the content of the file at `path`.
     pub(super) fn parse(path: &'a Path, bytes: &'a [u8]) -> Result<Self, SceneError> {
         let fail = |place: &str, problem: String| SceneError::Invalid {
             path: path.into(),
@@ -33,7 +33,8 @@ impl<'a> Document<'a> {
             }
             None => (Cow::Borrowed(bytes), None),
             Some(rest) => {
-                // The length field: the crate trusts it to be at least the header's own.
+                // The length field of the header is checked here, because the crate trusts it to be
+                // at least the header's own length.
                 let length = rest.get(4..8).map(|b| u32::from_le_bytes(b.try_into().unwrap()));
                 match length {
                     None => return Err(fail("header", "the file ends within it".into())),
@@ -66,7 +67,7 @@ impl<'a> Document<'a> {
             let problem = format!("is {needs:?}, only glTF 2 can be read");
             return Err(self.invalid("asset.version", problem));
         }
-        // Extensions that change what a surface looks like beyond its base colour are harmless.
+        // Extensions that only change a surface's look, but not its base colour, can be ignored.
         let known = |e: &str| {
             e.starts_with("KHR_materials_")
                 || [
@@ -109,7 +110,7 @@ impl<'a> Document<'a> {
         Ok(buffers)
     }
 
-    /// The files that this one refers to, of those that there are.
+    /// The files that this file refers to, without those that do not exist.
     pub(super) fn referred_files(&self) -> Vec<PathBuf> {
         let buffers = self.root.buffers.iter().filter_map(|b| b.uri.as_ref());
         let images = self.root.images.iter().filter_map(|i| i.uri.as_ref());
@@ -121,7 +122,7 @@ impl<'a> Document<'a> {
         self.path.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."))
     }
 
-    /// What a URI of the file refers to.
+    /// The bytes that a URI in the file refers to.
     pub(super) fn fetch(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
         if let Some(data) = uri.strip_prefix("data:") {
             return uri::decode_data(data).map_err(|problem| self.invalid(place, problem));
@@ -157,7 +158,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// What an index found at `place` points to.
+    /// The object that an index found at `place` refers to.
     pub(super) fn get<T>(&self, index: Index<T>, place: &str) -> Result<&T, SceneError>
     where
         Root: Get<T>,
@@ -171,7 +172,7 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The content of a plain file.
+/// The content of a regular file.
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
     let read = || {
         let file = std::fs::File::open(path)?;
@@ -180,14 +181,15 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
             return Err(std::io::Error::other("is not a file"));
         }
         let mut bytes = Vec::with_capacity(usize::try_from(metadata.len()).unwrap_or(0));
-        // A file that grows meanwhile, or lies about its length, stays within what it promised.
+        // Reading ends at the length found above, even if the file grows meanwhile or reports a
+        // wrong length.
         file.take(metadata.len()).read_to_end(&mut bytes)?;
         Ok(bytes)
     };
     read().map_err(|source| SceneError::Read { path: path.into(), source })
 }
 
-/// Repairs, those of one kind collected into one sentence.
+/// Notices about repairs. Repairs of one kind are collected into one sentence.
 #[derive(Default)]
 pub(super) struct Notices {
     entries: Vec<Entry>,
@@ -201,12 +203,12 @@ struct Entry {
 }
 
 impl Notices {
-    /// Something repaired at `place`.
+    /// Notes a repair of one thing at `place`.
     pub(super) fn add(&mut self, place: impl Display, what: impl Into<String>) {
         self.count(place, 0, what);
     }
 
-    /// `items` things repaired at `place`; nothing if there are none.
+    /// Notes a repair of `items` things at `place`; notes nothing if `items` is 0.
     pub(super) fn add_some(&mut self, place: impl Display, items: usize, what: &str) {
         if items > 0 {
             self.count(place, items, what);

@@ -3,20 +3,23 @@ use crate::error::SceneError;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Index;
 
-/// Entries of transforms beyond this count as overflow, long before products with positions do.
+/// Largest magnitude of an entry of a transform. Larger entries count as overflow, although
+/// products with positions overflow only much later.
 pub(super) const LARGEST: f64 = 1e100;
 
-/// Where every node of a file stands.
+/// The world transforms of a file's nodes.
 pub(super) struct Hierarchy {
-    /// By index of node; finite.
+    /// Indexed by node; all finite.
     pub(super) world_from_node: Vec<DAffine3>,
-    /// Nodes of the shown scene, each once, parents before children.
+    /// Indices of the nodes in the shown scene, each once, with parents before their children.
     pub(super) shown: Vec<usize>,
 }
 
 impl Hierarchy {
+    /// Computes the transforms of all nodes.
+    ///
     /// # Errors
-    /// Nodes with two parents or among their own ancestors, and transforms that are none.
+    /// A node has two parents or is its own ancestor, or its transform is invalid.
     pub(super) fn of(document: &Document) -> Result<Self, SceneError> {
         let nodes = &document.root.nodes;
         let children = |i: usize| nodes[i].children.iter().flatten().map(Index::value);

@@ -9,34 +9,37 @@ use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::collections::HashMap;
 use std::io::Cursor;
 
-/// Images beyond this many pixels a side are refused.
+/// Largest width and height of an image, pixels.
 const MAX_IMAGE_SIDE: u32 = 16_384;
-/// Pixels of all images of a scene together: 2 GiB once decoded.
+/// Largest number of pixels of all images of a scene together: 2 GiB once decoded.
 const MAX_PIXELS: u64 = 1 << 29;
 
-/// Where in a primitive a material finds its texture coordinates, and what to do to them.
+/// The texture coordinates of a primitive that a material uses, and the transform that it applies
+/// to them.
 #[derive(Clone, Copy)]
 pub(super) struct TexCoords {
-    /// n of `TEXCOORD_n`.
+    /// The n of `TEXCOORD_n`.
     pub(super) set: u32,
-    /// `KHR_texture_transform`.
+    /// The transform of `KHR_texture_transform`.
     pub(super) transform: Affine2,
 }
 
-/// Materials of the file, loaded when a primitive first uses them.
+/// The file's materials, each loaded when a primitive first uses it.
 #[derive(Default)]
 pub(super) struct Materials {
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<Texture>,
-    /// By index in the file; `None` is glTF's default material.
+    /// Keyed by index in the file; `None` is glTF's default material.
     loaded: HashMap<Option<usize>, (usize, Option<TexCoords>)>,
-    /// By the image's index in the file and its addressing, for files list textures that differ in
-    /// nothing we read; `None` could not be loaded.
+    /// Keyed by the image's index in the file and its addressing modes, because files list textures
+    /// that differ only in properties which are not read. The value is `None` if the image could
+    /// not be loaded.
     loaded_textures: HashMap<(usize, [Wrap; 2]), Option<TextureId>>,
 }
 
 impl Materials {
-    /// Index of a material, and where its texture's coordinates are.
+    /// Loads a material unless that is done already. Returns its index, and the texture coordinates
+    /// that its texture uses.
     pub(super) fn load(
         &mut self,
         document: &Document,
@@ -134,7 +137,7 @@ impl Materials {
             (None, None) => Err(document.invalid(&place, "has neither uri nor bufferView")),
         };
         let decoded_so_far: u64 = self.textures.iter().map(|t| t.rgba.len() as u64).sum();
-        // A picture that is missing or broken costs colour, not the scene.
+        // A missing or invalid image only loses a colour, so the scene is loaded without it.
         let decoded = bytes.map_err(|e| e.to_string()).and_then(|bytes| {
             decode(&bytes, MAX_PIXELS - decoded_so_far).map_err(|e| format!("{place}: {e}"))
         });
@@ -171,7 +174,7 @@ fn tex_coords(info: &Info) -> TexCoords {
     let Some(t) = extension else {
         return TexCoords { set: info.tex_coord, transform: Affine2::IDENTITY };
     };
-    // The rotation is counter-clockwise as seen with v running down.
+    // The rotation is counter-clockwise in a picture in which v increases downwards.
     let [scale, offset] = [t.scale.0, t.offset.0].map(Vec2::from);
     TexCoords {
         set: t.tex_coord.unwrap_or(info.tex_coord),

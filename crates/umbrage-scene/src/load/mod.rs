@@ -1,4 +1,4 @@
-//! glTF 2.0 files.
+//! Loads glTF 2.0 files.
 
 mod accessor;
 mod cameras_and_lights;
@@ -20,27 +20,34 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use umbrage::Aabb;
 
-/// Positions in the world end here, metres: those of the planner do.
+/// Largest distance of a position from the origin, metres. The planner has the same limit.
 const WORLD_END: f64 = 1e12;
 
-/// Reads a scene from a `.gltf` or `.glb` file (told apart by content).
+/// Reads a scene from a `.gltf` or `.glb` file; the content tells which of the two it is.
 ///
-/// The file's default scene is loaded, in the pose that its nodes have (skins bound, animations
-/// not played): triangles with base colour, `MASK` alpha, normals; cameras; lights of
-/// `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, also those of
-/// `EXT_mesh_gpu_instancing`. Buffers and images are read from the file itself, from data URIs, and
-/// from files below the scene's folder.
+/// The file's default scene is loaded in the pose that its nodes have: skins are applied,
+/// animations are not played. It consists of triangles with base colour, `MASK` alpha and normals,
+/// of cameras, and of the lights of `KHR_lights_punctual`. Each primitive is stored once and drawn
+/// by instances, including those of `EXT_mesh_gpu_instancing`. Buffers and images are read from the
+/// file itself, from data URIs, and from files below the scene's folder.
 ///
-/// These repairs are made, and told in [`Scene::notices`]: points and lines are left out, missing
-/// normals are computed, nodes that flatten their meshes are left out, materials whose image is
-/// missing or broken are plain, translucent (`BLEND`) materials are solid where alpha is at least
-/// one half and absent elsewhere, spot cones beyond 85° are narrowed. Vertex colours, morph targets
-/// and orthographic cameras are left out, with a notice too.
+/// The following repairs are made, each with a notice in [`Scene::notices`]:
+///
+/// - Points and lines are left out.
+/// - Missing normals are computed.
+/// - Nodes whose transforms flatten their meshes are left out.
+/// - Materials whose image is missing or invalid are plain.
+/// - Translucent (`BLEND`) materials are solid where alpha is at least one half and absent
+///   elsewhere.
+/// - Spot light cones with half angles beyond 85° are narrowed to 85°.
+///
+/// Vertex colours, morph targets and orthographic cameras are not supported and are left out, also
+/// with a notice.
 ///
 /// # Errors
-/// A file that cannot be read, breaks off, refers to files elsewhere, has indices that point
-/// nowhere, positions that are not finite, nodes that are no tree, extensions that change its
-/// geometry in unknown ways, or nothing to draw. The error says where in the file.
+/// The file cannot be read, is cut off, refers to files outside its folder, has indices out of
+/// range, positions that are not finite, nodes that do not form trees, extensions that change its
+/// geometry in unknown ways, or nothing to draw. The error names the place in the file.
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
     let bytes = document::read_file(path)?;
     let document = Document::parse(path, &bytes)?;
@@ -66,11 +73,11 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     Ok(loader.finish())
 }
 
-/// The files that [`load`] reads for a scene: its own first, then those that it refers to, in a fixed
-/// order. What cannot be found is left out.
+/// The files that [`load`] reads for a scene: first the scene file, then the files that it refers
+/// to, in a fixed order. Files that do not exist are left out.
 ///
 /// # Errors
-/// A file that cannot be read or is not glTF 2.0.
+/// The scene file cannot be read or is not glTF 2.0.
 pub fn files(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let bytes = document::read_file(path)?;
     let mut files = vec![path.to_owned()];
@@ -82,7 +89,7 @@ struct Loader<'a> {
     document: &'a Document<'a>,
     hierarchy: &'a Hierarchy,
     materials: Materials,
-    /// Scene meshes of each glTF mesh that has been loaded.
+    /// For each glTF mesh that has been loaded, the indices of the scene meshes made from it.
     loaded: HashMap<usize, Vec<usize>>,
     scene: Scene,
     notices: Notices,
@@ -125,7 +132,8 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// A skinned mesh is stored anew for each node: its shape depends on the pose.
+    /// Loads a skinned mesh. Each node that draws it gets a mesh of its own, because its shape
+    /// depends on the node's pose.
     fn load_skinned(
         &mut self,
         mesh: Index<gltf::json::Mesh>,
@@ -137,7 +145,8 @@ impl Loader<'_> {
             let world_from_mesh = match primitive::load_binding(document, json, place)? {
                 Some(b) => skin::pose(document, mesh, &b, joints, place, &mut this.notices)?,
                 None => {
-                    this.notices.add(place, "has a skin but no joints, shown where it was made");
+                    this.notices
+                        .add(place, "has a skin but no joints or weights, shown without the skin");
                     DAffine3::IDENTITY
                 }
             };
@@ -149,7 +158,8 @@ impl Loader<'_> {
         Ok(())
     }
 
-    /// Adds the primitives of a mesh to the scene, each `finished` first; returns their indices.
+    /// Adds the primitives of a mesh to the scene, after `finish` was applied to each. Returns
+    /// their indices.
     fn load_primitives(
         &mut self,
         mesh: Index<gltf::json::Mesh>,
@@ -178,8 +188,8 @@ impl Loader<'_> {
         Ok(made)
     }
 
-    /// Where a node draws its mesh, in the node's space: once where it stands, or wherever
-    /// `EXT_mesh_gpu_instancing` says.
+    /// The transforms at which a node draws its mesh, in the node's space: the identity alone, or
+    /// those of `EXT_mesh_gpu_instancing`.
     fn copies(&self, node: &Node, place: &str) -> Result<Vec<DAffine3>, SceneError> {
         let extension =
             node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
@@ -208,11 +218,14 @@ impl Loader<'_> {
             rotations.as_ref().map(Vec::len),
         ];
         let Some(n) = counts.into_iter().flatten().next() else {
-            // Only attributes of the file's own: all copies stand where the node does.
+            // The extension has only custom attributes, so all of its copies coincide with the
+            // node.
             return Ok(vec![DAffine3::IDENTITY]);
         };
         if counts.into_iter().flatten().any(|other| other != n) {
-            return Err(self.document.invalid(&place, "its attributes differ in number"));
+            return Err(self
+                .document
+                .invalid(&place, "its attributes have different numbers of elements"));
         }
         let vector = |values: &Option<Vec<[f32; 3]>>, i: usize, default| {
             values.as_ref().map_or(default, |v| DVec3::from(v[i].map(f64::from)))
@@ -223,19 +236,25 @@ impl Loader<'_> {
                 .map_or(DQuat::IDENTITY, |v| DQuat::from_array(v[i].map(f64::from)));
             let t = DAffine3::from_scale_rotation_translation(
                 vector(&scales, i, DVec3::ONE),
-                // A quaternion without length is not finite after this, and refused.
+                // A quaternion of zero length becomes non-finite here, and the transform is then
+                // refused.
                 rotation * (1.0 / rotation.length()),
                 vector(&translations, i, DVec3::ZERO),
             );
             match t.is_finite() {
                 true => Ok(t),
-                false => Err(self.document.invalid(&place, format!("instance {i} is nowhere"))),
+                false => Err(self
+                    .document
+                    .invalid(&place, format!("the transform of instance {i} is not finite"))),
             }
         };
         (0..n).map(copy).collect()
     }
 
-    /// The box around the scene, if there is something in it.
+    /// The box around the scene.
+    ///
+    /// # Errors
+    /// The scene draws nothing, or extends beyond [`WORLD_END`].
     fn check_drawn(&self) -> Result<Aabb, SceneError> {
         let bounds = self.scene.bounds();
         if self.scene.drawn_triangles() == 0 {
@@ -298,7 +317,7 @@ fn name_if_empty(name: &mut String, kind: &str, index: usize) {
     }
 }
 
-/// Whether a transform has no inverse worth the name.
+/// Whether a transform is singular, exactly or as far as rounding can tell.
 fn is_flat(m: DMat3) -> bool {
     let lengths = m.x_axis.length() * m.y_axis.length() * m.z_axis.length();
     let is_usable = |inverse: DMat3| inverse.to_cols_array().iter().all(|c| c.abs() <= LARGEST);

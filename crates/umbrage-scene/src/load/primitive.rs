@@ -7,7 +7,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
-/// Joints (four a vertex) and their weights.
+/// For each vertex, four joints and their weights.
 pub(super) struct Binding {
     pub(super) joints: Vec<[u32; 4]>,
     pub(super) weights: Vec<[f32; 4]>,
@@ -19,12 +19,13 @@ pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Ind
 
 /// The triangles of a primitive in its mesh's space; `None` if it has none.
 ///
-/// What glTF leaves to the reader or exporters often get wrong is repaired with a notice: points
-/// and lines are left out, strips and fans become triangles, missing normals are the triangles'
-/// own (as glTF asks) and normals without length the mean of the triangles around.
+/// Data that glTF leaves to the reader, or that exporters often get wrong, is repaired with a
+/// notice: points and lines are left out, strips and fans become triangles, missing normals are
+/// those of the triangles (as glTF demands), and normals of zero length become the mean of the
+/// surrounding triangles' normals.
 ///
 /// # Errors
-/// Positions that are not finite and indices out of range: such files are broken for good.
+/// A position is not finite or an index is out of range, which cannot be repaired.
 pub(super) fn load(
     document: &Document,
     primitive: &Primitive,
@@ -59,7 +60,7 @@ pub(super) fn load(
     };
     let triangles = triangles(mode, &indices);
     if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        notices.add(place, "the last triangle has less than three corners, left out");
+        notices.add(place, "the last triangle has fewer than three corners, left out");
     }
     if let Some(k) = indices.iter().position(|&i| i as usize >= positions.len()) {
         let (i, n) = (indices[k], positions.len());
@@ -103,7 +104,7 @@ pub(super) fn load(
     Ok(Some(mesh))
 }
 
-/// Texture coordinates of a primitive as its material wants them; none if it has none.
+/// Texture coordinates of a primitive, transformed for its material; empty if it has none.
 fn load_uvs(
     document: &Document,
     primitive: &Primitive,
@@ -127,7 +128,7 @@ fn load_uvs(
     Ok(uvs)
 }
 
-/// What binds a primitive's vertices to a skin's joints.
+/// The joints and weights of a primitive's vertices; `None` if the primitive lacks either.
 pub(super) fn load_binding(
     document: &Document,
     primitive: &Primitive,
@@ -153,7 +154,7 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
         Mode::TriangleStrip => indices
             .windows(3)
             .enumerate()
-            // Every second triangle of a strip runs the other way round.
+            // Every second triangle of a strip has the opposite winding.
             .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
             .collect(),
         Mode::TriangleFan => indices.windows(2).skip(1).map(|w| [indices[0], w[0], w[1]]).collect(),
@@ -161,13 +162,14 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
-/// Twice the area along the normal, in double precision so that it vanishes only if it must.
+/// The triangle's normal with twice its area as length, in double precision so that it is zero only
+/// for triangles without area.
 fn area_normal(positions: &[Vec3], triangle: [u32; 3]) -> glam::DVec3 {
     let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3());
     (b - a).cross(c - a)
 }
 
-/// Gives every triangle corners of its own with the triangle's normal.
+/// Gives every triangle corners of its own, which have the triangle's normal.
 pub(super) fn shade_flat(mesh: &mut Mesh) {
     let corners = || mesh.triangles.iter().flatten().map(|&i| i as usize);
     let normals = mesh.triangles.iter().flat_map(|&t| {
@@ -186,7 +188,8 @@ pub(super) fn shade_flat(mesh: &mut Mesh) {
     }
 }
 
-/// Keeps only the vertices that triangles use: files may let all primitives share one large array.
+/// Removes the vertices that no triangle uses, because files may let all primitives share one large
+/// array.
 pub(super) fn drop_unused_vertices(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     for &i in mesh.triangles.iter().flatten() {
@@ -211,12 +214,13 @@ pub(super) fn drop_unused_vertices(mesh: &mut Mesh) {
     mesh.uvs = keep(&mesh.uvs, &used);
 }
 
-/// The values that are used; none of an empty list.
+/// The values of the used vertices; empty for an empty list.
 fn keep<T: Copy>(values: &[T], used: &[bool]) -> Vec<T> {
     values.iter().zip(used).filter(|(_, used)| **used).map(|(value, _)| *value).collect()
 }
 
-/// Makes all normals unit vectors; returns how many had no direction of their own.
+/// Makes all normals unit vectors. Returns how many of them had no direction and were computed from
+/// the triangles.
 fn repair_normals(mesh: &mut Mesh) -> usize {
     let mut missing = vec![false; mesh.normals.len()];
     for (normal, missing) in mesh.normals.iter_mut().zip(&mut missing) {

@@ -6,7 +6,7 @@ use crate::types::Mesh;
 use glam::{DAffine3, DMat3, DMat4, DVec3};
 use gltf::json::{Index, Skin};
 
-/// World from each joint's bind space, in the pose that the nodes stand in.
+/// For each joint, the transform from its bind space to the world, in the pose that the nodes have.
 pub(super) fn joint_matrices(
     document: &Document,
     skin: Index<Skin>,
@@ -38,8 +38,9 @@ pub(super) fn joint_matrices(
     json.joints.iter().zip(inverse_binds).map(joint).collect()
 }
 
-/// Puts a mesh into the pose of its joints. The result is in a space moved by the returned
-/// translation from the world, so that figures far from the origin keep their shape.
+/// Deforms a mesh to the pose of its joints. The returned translation takes the mesh's new space to
+/// the world. The new space has its origin at a joint, so that single precision keeps the shape of
+/// meshes far from the world's origin.
 pub(super) fn pose(
     document: &Document,
     mesh: &mut Mesh,
@@ -50,7 +51,7 @@ pub(super) fn pose(
 ) -> Result<DAffine3, SceneError> {
     let n = mesh.positions.len();
     if binding.joints.len() != n || binding.weights.len() != n {
-        return Err(document.invalid(place, "has not one set of joints and weights a position"));
+        return Err(document.invalid(place, "must have one set of joints and weights per position"));
     }
     let origin = joints.first().map_or(DVec3::ZERO, |j| j.translation);
     let mut unbound = 0;
@@ -62,7 +63,8 @@ pub(super) fn pose(
                 continue;
             }
             let joint = joints.get(index as usize).ok_or_else(|| {
-                let problem = format!("vertex {i} hangs on joint {index} of {}", joints.len());
+                let problem =
+                    format!("vertex {i} uses joint {index}, the skin has {}", joints.len());
                 document.invalid(place, problem)
             })?;
             let weight = f64::from(weight);
@@ -83,8 +85,8 @@ pub(super) fn pose(
         if !mesh.positions[i].is_finite() {
             return Err(document.invalid(place, format!("the pose moves vertex {i} out of range")));
         }
-        // Directions of planes transform by the cofactor matrix. Where the pose squashes the
-        // surface flat, the old direction serves as well as any.
+        // Normals transform by the cofactor matrix. Where the pose flattens the surface, the old
+        // normal is kept, because no direction is better than another.
         let m = blend.matrix3;
         let cofactor = DMat3::from_cols(
             m.y_axis.cross(m.z_axis),
@@ -94,6 +96,6 @@ pub(super) fn pose(
         let normal = mesh.normals[i].as_dvec3();
         mesh.normals[i] = (cofactor * normal).normalize_or(normal).as_vec3();
     }
-    notices.add_some(place, unbound, "vertices hang on no joint, moved with the first");
+    notices.add_some(place, unbound, "vertices have no joint weights, moved with the first joint");
     Ok(DAffine3::from_translation(origin))
 }

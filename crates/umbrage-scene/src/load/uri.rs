@@ -1,7 +1,8 @@
 use base64::Engine;
 use std::path::{Component, Path, PathBuf};
 
-/// The bytes of a data URI, given what follows `data:`. Only base64, as glTF demands.
+/// The bytes of a data URI, given the text that follows `data:`. Only base64 is accepted, as glTF
+/// demands.
 pub(super) fn decode_data(data: &str) -> Result<Vec<u8>, String> {
     let (head, payload) = data.split_once(',').ok_or("its data: URI has no comma")?;
     if !head.ends_with(";base64") {
@@ -12,7 +13,7 @@ pub(super) fn decode_data(data: &str) -> Result<Vec<u8>, String> {
         .map_err(|e| format!("its data: URI is broken: {e}"))
 }
 
-/// Where a relative, percent-encoded URI leads, if that is a place below `folder`.
+/// The path that a relative, percent-encoded URI refers to, if it lies below `folder`.
 pub(super) fn file_below(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     let refuse =
         |why: &str| Err(format!("uri {uri:?} {why}; only files below the scene's folder are read"));
@@ -26,15 +27,15 @@ pub(super) fn file_below(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     for component in relative.components() {
         match component {
             Component::Normal(_) | Component::CurDir => {}
-            Component::ParentDir => return refuse("climbs up by .."),
+            Component::ParentDir => return refuse("leads out of the folder by .."),
             Component::RootDir | Component::Prefix(_) => return refuse("is absolute"),
         }
     }
-    // Resolved on disk, so that no link leads out either.
+    // The path is resolved on disk, so that no link leads out of the folder.
     let real = |p: &Path| p.canonicalize().map_err(|e| format!("uri {uri:?}: {e}"));
     let file = real(&folder.join(relative))?;
     if !file.starts_with(real(folder)?) {
-        return refuse("is a link that leads out");
+        return refuse("leads out of the folder by a link");
     }
     Ok(file)
 }

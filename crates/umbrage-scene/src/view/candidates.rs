@@ -4,7 +4,7 @@ use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
 use umbrage::Aabb;
 
-/// Whether walls close the scene off at its sides, so that from outside there is little to see.
+/// Whether walls enclose the scene at its sides, so that little of it can be seen from outside.
 pub(super) fn is_room(grid: &Occupancy, bounds: Aabb) -> bool {
     const RAYS: u32 = 24;
     let size = bounds.size();
@@ -21,7 +21,7 @@ pub(super) fn is_room(grid: &Occupancy, bounds: Aabb) -> bool {
         });
         hits.count() as f64 > 0.85 * f64::from(RAYS * RAYS)
     };
-    // In a room, unlike in a car or a rock, one can see far.
+    // Inside a room one can see far, unlike inside a car or a rock.
     let reach = (0..64).map(|k| {
         let direction = DQuat::from_rotation_y(f64::from(k) / 64.0 * TAU) * DVec3::X;
         let wall = (size / 2.0 / direction.abs()).with_y(f64::INFINITY).min_element();
@@ -32,22 +32,25 @@ pub(super) fn is_room(grid: &Occupancy, bounds: Aabb) -> bool {
         && [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].into_iter().all(is_wall)
 }
 
-/// Views from outside onto some points, at distances where they fill the picture.
+/// Views of `points` from outside, as (eye, target), at distances where the points fill the
+/// picture.
 pub(super) fn around(points: &[DVec3], bounds: Aabb) -> Vec<(DVec3, DVec3)> {
     let center = Aabb::around(points.iter().copied()).center();
     let slopes = DVec2::new(ASPECT, 1.0) * (LONG_RAD / 2.0).tan() * 0.86;
     let closest = bounds.size().max_element().max(1e-6) * 1e-3;
     let mut views = Vec::new();
     for elevation_deg in [12.0_f64, 22.0, 32.0] {
-        // Most models stand along the axes: seen from between them, two of their sides show.
+        // Most models are aligned with the axes. Views from directions between the axes show two of
+        // their sides.
         for azimuth_deg in (0..4).flat_map(|quarter| [35, 55].map(|turn| quarter * 90 + turn)) {
             let azimuth = f64::from(azimuth_deg).to_radians();
             let (sin, cos) = elevation_deg.to_radians().sin_cos();
             let back = DVec3::new(azimuth.sin() * cos, sin, azimuth.cos() * cos);
             let right = DVec3::Y.cross(back).normalize();
             let up = back.cross(right);
-            // The side planes (left, right, bottom, top) that touch the points from outside meet at
-            // the eye: two and two give its place across, whichever pair is wider its distance.
+            // The four side planes (left, right, bottom, top) that enclose the points meet at the
+            // eye. Each pair gives the eye's position across the view direction, and the wider pair
+            // its distance.
             let mut planes = [f64::NEG_INFINITY; 4];
             for p in points {
                 let v = *p - center;
@@ -67,7 +70,7 @@ pub(super) fn around(points: &[DVec3], bounds: Aabb) -> Vec<(DVec3, DVec3)> {
     views
 }
 
-/// Views from places inside a box where one can stand.
+/// Views from free places inside the box `focus`, as (eye, target).
 pub(super) fn within(
     grid: &Occupancy,
     focus: Aabb,

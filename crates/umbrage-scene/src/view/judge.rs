@@ -3,31 +3,31 @@ use super::{THUMBNAIL, thumbnail};
 use glam::DVec3;
 use std::collections::HashSet;
 
-/// What a candidate view shows, as shares of its picture.
+/// Measures of what a candidate view shows. Shares are of its picture.
 pub(super) struct Judged {
     pub(super) eye: DVec3,
     pub(super) target: DVec3,
-    /// Least depth of anything seen, metres.
+    /// Least depth of any visible surface, metres.
     pub(super) nearest: f64,
-    /// Different cells seen that stand out.
+    /// Number of different visible cells that stand out from the ground.
     pub(super) cells_seen: usize,
-    /// Anything at all.
+    /// Share that shows any surface.
     hit: f64,
-    /// Surfaces from behind.
+    /// Share that shows the back of a surface.
     behind: f64,
-    /// Nothing where there should be ground.
+    /// Share that shows the sky below the horizon, where there should be ground.
     void: f64,
-    /// What stands out.
+    /// Share that shows cells which stand out from the ground.
     content: f64,
-    /// Surfaces that face up: they receive the shadows.
+    /// Share that shows surfaces facing up, which receive the shadows.
     upward: f64,
-    /// Things right before the eye.
+    /// Share that shows surfaces close to the eye.
     close: f64,
-    /// Standard deviation of the depth's logarithm.
+    /// Standard deviation of the logarithm of depth.
     depth_spread: f64,
-    /// Mean depth over the scene's longest edge.
+    /// Geometric mean of depth over the longest edge of the scene's box.
     mean_depth: f64,
-    /// The lesser of the shares that show surfaces facing along x and along z.
+    /// The lesser of two shares: of surfaces that face along x, and of surfaces that face along z.
     sides: f64,
 }
 
@@ -83,11 +83,11 @@ impl Judged {
         counts
     }
 
-    /// Higher is better. The weights were chosen by looking at pictures.
+    /// Score of the view; higher is better. The weights were chosen by comparing pictures.
     pub(super) fn score(&self, most_seen: usize, is_room: bool) -> f64 {
         let peak = |x: f64, best: f64| 1.0 - ((x - best) / best).abs().min(1.0);
         let seen = self.cells_seen as f64 / most_seen.max(1) as f64;
-        // In a room everything fills the picture: what counts is to look along it.
+        // In a room, everything fills the picture, so views along the room are preferred.
         let far = if is_room { 4.0 * self.mean_depth.min(0.5) } else { 0.0 };
         far + 1.0 * seen
             + 0.8 * peak(self.content, 0.4)

@@ -3,16 +3,17 @@ use super::{THUMBNAIL, thumbnail};
 use glam::{DQuat, DVec3};
 use umbrage::Light;
 
-/// A light for a view, and how good it is there.
+/// A light for a view, and its score in that view.
 pub(super) struct Lighting {
     pub(super) light: Light,
     /// Higher is better; at most about 1.
     pub(super) score: f64,
 }
 
-/// `own`, or else the sun that suits a view: it stands to the side of the viewer, where it lights
-/// most of what is seen and many edges of shadows show. Its elevation is 45°, lower only over land
-/// so gentle that no shadows would fall.
+/// Returns `own` with its score or, without one, the sun that suits the view best: a sun at the
+/// side of the viewer, which lights most of the visible surfaces and shows many edges of shadows.
+/// Its elevation is 45°, or less if the relief is so gentle that a sun at 45° would cast no
+/// shadows.
 pub(super) fn lighting(
     grid: &Occupancy,
     own: Option<Light>,
@@ -23,19 +24,21 @@ pub(super) fn lighting(
     let seen: Vec<Option<DVec3>> = thumbnail(eye, target, fov_y_rad)
         .map(|direction| {
             let sight = grid.look(eye, direction)?;
-            // A little before the surface, so that its own cells do not shade it.
+            // The point lies a little before the surface, so that the surface's own cells do not
+            // shadow it.
             let back = 1.5 * grid.cell.max_element() / direction.length();
             Some(eye + direction * (sight.distance - back).max(0.0))
         })
         .collect();
-    // What is this near a lamp does not hide it: it hangs in a cage, or under a shade.
+    // Surfaces this near a spot or point light do not hide it, because it may hang in a cage or
+    // under a shade.
     let housing = 3.0 * grid.cell.max_element();
     let reaches = |p: DVec3, lamp: DVec3| {
         let to_lamp = lamp - p;
         let is_beyond = |share: f64| (1.0 - share) * to_lamp.length() < housing;
         grid.look(p, to_lamp).is_none_or(|s| is_beyond(s.distance))
     };
-    // How good a light is, and the share of what is seen that it leaves dark.
+    // The score of a light, and the share of the visible points that are in shadow.
     let judge = |light: &Light| {
         let is_lit = |p: DVec3| match light {
             Light::Directional { direction } => grid.look(p, -*direction).is_none(),
@@ -83,7 +86,7 @@ pub(super) fn lighting(
     best
 }
 
-/// Unit vector towards a sun to the left of someone looking `forward`.
+/// Unit vector towards a sun at an angle of `azimuth_deg` to the left of the direction `forward`.
 pub(super) fn towards_sun(forward: DVec3, azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
     let (sin, cos) = elevation_deg.to_radians().sin_cos();
     let ahead = forward.with_y(0.0).normalize_or(DVec3::NEG_Z);
@@ -105,7 +108,8 @@ mod tests {
             let lamp = Light::Point(PointLight { range, ..flame });
             lighting(&grid, Some(lamp), view.eye, view.target, view.fov_y_rad).score
         };
-        // A lamp that reaches nothing leaves all dark, without an edge.
+        // A light whose range reaches no surface leaves everything dark, without any edge of a
+        // shadow.
         let dark = score(0.06);
         assert!((dark + 0.6).abs() < 1e-9, "{dark}");
         assert!(score(flame.range) > 0.0, "{}", score(flame.range));

@@ -1,4 +1,4 @@
-//! Where to look from, and how to light, if the file does not say.
+//! Chooses a view and a light for scenes whose files have none.
 
 mod candidates;
 mod judge;
@@ -14,25 +14,28 @@ use occupancy::Occupancy;
 use std::f64::consts::TAU;
 use umbrage::{Aabb, Light};
 
-/// Vertical field of view of views into rooms and worlds, radians.
+/// Vertical field of view for views into rooms and landscapes, radians.
 const WIDE_RAD: f64 = 50.0 * TAU / 360.0;
-/// Vertical field of view of views onto objects, radians: long lenses keep their shape.
+/// Vertical field of view for views of objects, radians. A narrow field of view keeps their shape.
 const LONG_RAD: f64 = 32.0 * TAU / 360.0;
-/// Width over height that default views are composed for.
+/// Aspect ratio (width over height) for which default views are composed.
 const ASPECT: f64 = 16.0 / 9.0;
-/// Rays of the thumbnail that a candidate view is judged by.
+/// Width and height of the thumbnail, in rays, by which a candidate view is judged.
 const THUMBNAIL: [u32; 2] = [32, 18];
-/// Views whose light is tried out.
+/// Number of best views for which a light is tried.
 const SHORT_LIST: usize = 40;
-/// Far over near distance at most: deeper ranges make every shadow map look bad near the viewer.
+/// Largest ratio of far to near distance. Deeper ranges make every shadow map look bad near the
+/// viewer.
 const MAX_DEPTH_RATIO: f64 = 1000.0;
 
 impl Scene {
-    /// The scene's first camera, else a view chosen to show it and its shadows: into closed rooms
-    /// and wide worlds from within, a little above the ground; of single objects from outside, a
-    /// little from above. Near and far distance follow from the scene's size.
+    /// The scene's first camera or, without one, a view chosen to show the scene and its shadows.
+    /// Closed rooms and wide landscapes are seen from within, a little above the ground. Single
+    /// objects are seen from outside, a little from above. Near and far distance follow from the
+    /// scene's size.
     ///
-    /// Takes a fraction of a second for millions of triangles; the same scene gives the same view.
+    /// Takes a fraction of a second for millions of triangles. The same scene always gets the same
+    /// view.
     pub fn default_view(&self) -> SceneCamera {
         self.cameras.first().cloned().unwrap_or_else(|| match self.bounds() {
             b if b.is_empty() => {
@@ -42,15 +45,16 @@ impl Scene {
         })
     }
 
-    /// The scene's first light that shines at all (intensity above 0), else an afternoon sun that
-    /// suits [`default_view`](Self::default_view). It stands 45° high, lower only over land so gentle
-    /// that no shadows would fall.
+    /// The scene's first light with an intensity above 0 or, without one, an afternoon sun that
+    /// suits [`default_view`](Self::default_view). The sun's elevation is 45°, or less if the
+    /// relief is so gentle that a sun at 45° would cast no shadows.
     pub fn default_light(&self) -> SceneLight {
         self.light_for_view(&self.default_view())
     }
 
-    /// The light of [`default_light`](Self::default_light) for another view: the sun stands to the
-    /// side of the viewer, where it lights much of what is seen and throws long shadows across it.
+    /// The light of [`default_light`](Self::default_light) for another view. The sun is at the side
+    /// of the viewer, where it lights many of the visible surfaces and casts long shadows across
+    /// them.
     pub fn light_for_view(&self, view: &SceneCamera) -> SceneLight {
         self.own_light().cloned().unwrap_or_else(|| {
             let light = match self.bounds() {
@@ -80,7 +84,7 @@ fn camera(eye: DVec3, target: DVec3, fov_y_rad: f64, near: f64, far: f64) -> Sce
     SceneCamera { name: "default".into(), eye, target, up: DVec3::Y, fov_y_rad, near, far }
 }
 
-/// The best of many views.
+/// Chooses the best of many candidate views.
 fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera {
     let content = grid.content();
     let typical_height = content.map_or(bounds.size().y * 0.2, |(_, height)| height);
@@ -88,19 +92,20 @@ fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera 
     let focus = content.filter(|_| has_ground).map_or(bounds, |(around, _)| around);
     let flatness = focus.size().y / focus.size().x.max(focus.size().z);
     let is_room = is_room(grid, bounds);
-    // Worlds are stood in, objects are looked at.
+    // A flat scene is a landscape and seen from within; others are objects and seen from outside.
     let is_world = flatness < 0.12 || flatness < 0.25 && has_ground;
     let mut candidates = match is_room || is_world {
         true => within(grid, focus, typical_height, is_room),
         false => Vec::new(),
     };
-    // Where there is nowhere to stand, too, the view is from outside.
+    // A scene without free places inside is seen from outside too.
     let from_outside = candidates.is_empty();
     if from_outside {
         candidates = around(&grid.points_in(focus), bounds);
     }
     let fov_y_rad = if from_outside { LONG_RAD } else { WIDE_RAD };
-    // Objects without ground only shade themselves.
+    // The light matters less for objects without ground, because they only cast shadows on
+    // themselves.
     let light_weight = if from_outside && !has_ground { 0.7 } else { 2.0 };
     let judge = |(eye, target)| Judged::new(grid, eye, target, fov_y_rad);
     let mut judged: Vec<Judged> = candidates.into_iter().map(judge).collect();
@@ -108,7 +113,7 @@ fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera 
     let score = |j: &Judged| j.score(most_seen, is_room);
     judged.sort_by(|a, b| score(b).total_cmp(&score(a)));
     judged.truncate(SHORT_LIST);
-    // Among the best, that with the most to see in the light that it will have.
+    // Among the best views, the one with the best score in its light is chosen.
     let lit_score = |j: &Judged| {
         let lit = lighting(grid, light, j.eye, j.target, fov_y_rad);
         score(j) + light_weight * lit.score
@@ -126,7 +131,7 @@ fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera 
     camera(best.eye, best.target, fov_y_rad, near, far)
 }
 
-/// The eye's directions through the pixels of a thumbnail, row by row from below, of unit depth.
+/// Directions of unit depth from the eye through the pixels of a thumbnail, row by row from below.
 fn thumbnail(eye: DVec3, target: DVec3, fov_y_rad: f64) -> impl Iterator<Item = DVec3> {
     let forward = (target - eye).normalize();
     let right = forward.cross(DVec3::Y).normalize_or(DVec3::X);

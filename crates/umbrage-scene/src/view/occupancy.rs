@@ -2,33 +2,33 @@ use crate::types::{Mesh, Scene};
 use glam::{DVec3, IVec3, USizeVec3, Vec3};
 use umbrage::Aabb;
 
-/// Cells along the longest edge of the scene's box.
+/// Number of cells along the longest edge of the scene's box.
 const CELLS: f64 = 160.0;
-/// Cells at least along the other edges, so that flat worlds keep their relief.
+/// Least number of cells along the other edges, so that flat scenes keep their relief.
 const MIN_CELLS: f64 = 24.0;
-/// Triangles looked at; larger meshes are thinned out beyond.
+/// Largest number of triangles that are entered. Of larger scenes, only every n-th triangle is.
 const MAX_TRIANGLES: u64 = 4_000_000;
 
-/// Directions that a cell's surfaces face, one bit each: −x, −y, −z, +x, +y, +z.
+/// Directions that the surfaces in a cell face, one bit each: −x, −y, −z, +x, +y, +z.
 pub(super) type Facing = u8;
 /// The bit of surfaces that face up.
 pub(super) const UP: Facing = 1 << 4;
 
-/// Which parts of a scene's box hold surfaces: a coarse picture of it, quick to make and to look
-/// around in.
+/// A grid of cells in a scene's box that tells which cells hold surfaces. It is quick to build and
+/// quick to cast rays in.
 pub(super) struct Occupancy {
     bounds: Aabb,
     size: USizeVec3,
-    /// Metres.
+    /// Width, height and depth of a cell, metres.
     pub(super) cell: DVec3,
     cells: Vec<Facing>,
-    /// Lowest occupied layer of each column; `None` where there is nothing.
+    /// Lowest occupied layer of each column; `None` for an empty column.
     floor: Vec<Option<usize>>,
 }
 
-/// A cell that a line of sight ends at.
+/// The cell where a ray ends.
 pub(super) struct Sight {
-    /// In lengths of the direction looked along.
+    /// Distance along the ray, in lengths of its direction.
     pub(super) distance: f64,
     /// Index of the cell.
     pub(super) cell: usize,
@@ -36,12 +36,12 @@ pub(super) struct Sight {
 }
 
 impl Occupancy {
-    /// `bounds` must be those of the scene and not empty.
+    /// Builds the grid. `bounds` must be the scene's bounds and not empty.
     pub(super) fn of(scene: &Scene, bounds: Aabb) -> Self {
         let extent = bounds.size();
         let longest = extent.max_element().max(1e-9);
         let size = (extent * (CELLS / longest)).ceil().max(DVec3::splat(MIN_CELLS));
-        // A box without thickness still has cells.
+        // The cells of a box without thickness still need a thickness.
         let cell = extent.max(DVec3::splat(longest * 1e-6)) / size;
         let size = size.as_usizevec3();
         let mut grid = Self {
@@ -89,7 +89,8 @@ impl Occupancy {
         }
     }
 
-    /// Marks the cells of a triangle given in cells, by points closer than a cell.
+    /// Marks the cells that a triangle lies in, by points on it less than a cell apart. The corners
+    /// are in units of cells.
     fn fill(&mut self, [a, b, c]: [Vec3; 3], facing: Facing) {
         let edges = [b - a, c - b, a - c].map(|e| e.abs().max_element());
         let n = (edges.into_iter().fold(0.0, f32::max) * 1.5).ceil().clamp(1.0, 400.0) as u32;
@@ -108,7 +109,7 @@ impl Occupancy {
         (z * self.size.y + y) * self.size.x + x
     }
 
-    /// The cell around a point, if inside the box.
+    /// The cell that contains a point, if the point is inside the box.
     fn cell_of(&self, p: DVec3) -> Option<USizeVec3> {
         let c = (p - self.bounds.min) / self.cell;
         let inside = c.cmpge(DVec3::ZERO).all() && c.cmplt(self.size.as_dvec3()).all();
@@ -120,7 +121,7 @@ impl Occupancy {
         (self.size.as_dvec3() * self.cell).max_element()
     }
 
-    /// Whether there is nothing in a point's cell and those beside it.
+    /// Whether a point's cell and its neighbours along x and z are empty.
     pub(super) fn is_free(&self, p: DVec3) -> bool {
         let sides = [DVec3::ZERO, DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z];
         sides.iter().all(|d| {
@@ -129,14 +130,14 @@ impl Occupancy {
         })
     }
 
-    /// Height of the ground at a point's column, metres; the box's floor where there is none.
+    /// Height of the ground in a point's column, metres; the bottom of the box in an empty column.
     pub(super) fn floor_at(&self, p: DVec3) -> f64 {
         let cell = self.cell_of(p.with_y(self.bounds.min.y));
         let layer = cell.and_then(|c| self.floor[c.z * self.size.x + c.x]);
         self.bounds.min.y + layer.map_or(0.0, |l| (l as f64 + 1.0) * self.cell.y)
     }
 
-    /// The share of columns that hold anything.
+    /// The share of columns that are not empty.
     pub(super) fn floor_share(&self) -> f64 {
         self.floor.iter().flatten().count() as f64 / self.floor.len() as f64
     }
@@ -149,8 +150,8 @@ impl Occupancy {
         self.floor[z * self.size.x + x].is_some_and(|floor| y > floor + 1)
     }
 
-    /// The box around what stands out, and the height, in metres above the ground, that three
-    /// quarters of its columns stay below; `None` if nothing does.
+    /// The box around the cells that stand out from the ground, and their typical height above it,
+    /// metres: three quarters of the columns stay below. `None` if no cell stands out.
     pub(super) fn content(&self) -> Option<(Aabb, f64)> {
         let mut around = Aabb::EMPTY;
         let mut heights = Vec::new();
@@ -176,8 +177,8 @@ impl Occupancy {
         Some((around, *typical))
     }
 
-    /// Centres of the outermost cells in a box: those with nothing before or behind them along any
-    /// axis. The box's centre if all is empty.
+    /// Centres of the occupied cells in a box that have an empty neighbour along some axis, or the
+    /// centre of the box if there are none.
     pub(super) fn points_in(&self, within: Aabb) -> Vec<DVec3> {
         let USizeVec3 { x: nx, y: ny, z: nz } = self.size;
         let is_free = |x: usize, y: usize, z: usize| {
@@ -187,7 +188,8 @@ impl Occupancy {
         for z in 0..nz {
             for y in 0..ny {
                 for x in 0..nx {
-                    // Wraps at the box's faces, and counts as free there.
+                    // The subtraction wraps at the faces of the box, and neighbours beyond the box
+                    // count as empty.
                     let [x0, y0, z0] = [x, y, z].map(|i| i.wrapping_sub(1));
                     let outermost = is_free(x0, y, z)
                         || is_free(x + 1, y, z)
@@ -212,12 +214,13 @@ impl Occupancy {
         points
     }
 
-    /// What is first seen from `eye` along `direction`, beyond the eye's own cell.
+    /// The first occupied cell along a ray from `eye`, apart from the cell that contains the eye.
     pub(super) fn look(&self, eye: DVec3, direction: DVec3) -> Option<Sight> {
         let origin = (eye - self.bounds.min) / self.cell;
         let direction = direction / self.cell;
         let end = self.size.as_dvec3();
-        // Where the line is inside the box (slabs), then from cell to cell (Amanatides and Woo 1987).
+        // First the interval in which the ray is inside the box (slab test), then a traversal from
+        // cell to cell (Amanatides and Woo 1987).
         let inverse = direction.recip();
         let (a, b) = (-origin * inverse, (end - origin) * inverse);
         let enter = a.min(b).max_element().max(0.0);
@@ -229,7 +232,7 @@ impl Occupancy {
         let mut at = start.floor().clamp(DVec3::ZERO, end - 1.0).as_ivec3();
         let step = direction.signum().as_ivec3();
         let ahead = at.as_dvec3() + direction.signum().max(DVec3::ZERO);
-        // A direction along a cell's face never leaves through it (0·∞ is NaN, of either sign).
+        // A ray along a face of a cell never leaves through it. 0·∞ would give NaN of either sign.
         let along_face = direction.cmpeq(DVec3::ZERO);
         let mut next = DVec3::select(along_face, DVec3::INFINITY, (ahead - origin) * inverse);
         let per_cell = inverse.abs();
@@ -257,7 +260,7 @@ impl Occupancy {
     }
 }
 
-/// The bit of the axis that a direction is closest to, and those that it is nearly as close to.
+/// The bits of the axis that a direction is closest to, and of those that are nearly as close.
 fn faced(direction: DVec3) -> Facing {
     let longest = direction.abs().max_element();
     let bit = |i: usize| {
@@ -271,7 +274,8 @@ fn faced(direction: DVec3) -> Facing {
     bit(0) | bit(1) | bit(2)
 }
 
-/// Whether a surface that faces so can be seen by someone looking along `direction`.
+/// Whether a ray along `direction` sees the front of a surface that faces in one of these
+/// directions.
 pub(super) fn is_seen(facing: Facing, direction: DVec3) -> bool {
     facing & faced(-direction) != 0
 }

@@ -54,13 +54,14 @@ pub(crate) fn sheet(corner: Vec3, u: Vec3, v: Vec3) -> Mesh {
     }
 }
 
-/// The square of half-width `half` around the origin in the plane y = 0.
+/// The square of half-width `half` around the origin, in the plane y = 0.
 pub(crate) fn ground(half: f32) -> Mesh {
     let corner = Vec3::new(-half, 0.0, -half);
     sheet(corner, Vec3::Z * (2.0 * half), Vec3::X * (2.0 * half))
 }
 
-/// A closed sphere, `rings` from pole to pole; all seams share their corners.
+/// A closed sphere with `rings` rings of triangles from pole to pole. Triangles at seams share
+/// corners.
 pub(crate) fn sphere(center: Vec3, radius: f32, rings: u32) -> Mesh {
     let sectors = 2 * rings;
     let mut positions = vec![center + Vec3::Y * radius];
@@ -103,8 +104,8 @@ pub(crate) fn camera(eye: DVec3, target: DVec3, image: [u32; 2]) -> Camera {
         .unwrap()
 }
 
-/// An even map of the square of half-width `half` across the light around `center`, of depth range
-/// `center` ± `reach`, metres.
+/// A uniform map of a square across the light, with half-width `half` around `center` and a depth
+/// range of `center` ± `reach`, metres.
 pub(crate) fn even_map(
     center: DVec3,
     travel: DVec3,
@@ -154,8 +155,9 @@ pub(crate) fn towards(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> S
     tracer.surface(&hit, direction)
 }
 
-/// All hits of a ray by Möller and Trumbore's test over every triangle in world space, with how far
-/// inside its triangle each lies (barycentric); near zero, rounding may put it in or out.
+/// All hits of a ray, by the test of Möller and Trumbore over every triangle in world space. With
+/// each comes how far inside its triangle the hit lies (the smallest barycentric coordinate); near
+/// zero, rounding may put the hit inside or outside.
 pub(crate) fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)> {
     let mut hits = Vec::new();
     for (i, instance) in scene.instances.iter().enumerate() {
@@ -176,7 +178,7 @@ pub(crate) fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)>
             let (u, v) = (s.dot(p) / determinant, ray.direction.dot(q) / determinant);
             let t = e2.dot(q) / determinant;
             let area = e1.cross(e2).length();
-            // Edge-on there is no saying.
+            // A ray that sees a triangle edge-on may hit or miss it.
             let is_clear = determinant.abs() > 1e-9 * area * ray.direction.length();
             let margin = if is_clear { u.min(v).min(1.0 - u - v) } else { 0.0 };
             if t.is_finite() && margin > -1e-6 && t > 0.0 {
@@ -189,7 +191,7 @@ pub(crate) fn all_hits(scene: &Scene, ray: Ray) -> Vec<(f64, PrimitiveRef, f64)>
     hits
 }
 
-/// Reproducible numbers in [0, 1): SplitMix64.
+/// Reproducible numbers in [0, 1), by SplitMix64.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -223,7 +225,7 @@ impl Random {
     }
 }
 
-/// Plans one light's maps for all of a scene.
+/// Plans the maps of one light for the whole scene.
 pub(crate) fn plan(scene: &Scene, camera: &Camera, light: Light, technique: &Technique) -> Plan {
     let bounds = Bounds::of_scene(scene.bounds());
     Planner::new().plan(camera, &[light], &bounds, technique).unwrap().clone()

@@ -82,10 +82,11 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
     let own = bench.own_casters(
         &shadows,
         "@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
-            let unused = shadow_caster_clip(vec3f(0.0)) * 0.0;
+            let unused = shadow_caster(vec3f(0.0)).clip * 0.0;
             return vec4f(f32((i << 1u) & 2u) * 2.0 - 1.0, f32(i & 2u) * 2.0 - 1.0, 0.25, 1.0) + unused;
         }
         @fragment fn fragment() {}",
+        Some("fragment"),
     );
     let mut frame = |casters, draws: bool| {
         let frame = Frame { plan: &plan, render_origin: plan.origin, casters };

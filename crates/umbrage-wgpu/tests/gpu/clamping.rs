@@ -16,14 +16,74 @@ const POSITIONS: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     attributes: &wgpu::vertex_attr_array![0 => Float32x3],
 };
 
-/// The depths of all maps over a plain, with a slanted sheet that reaches from the ground far above everything.
-fn depths(emulated: bool, warp: Warp) -> Vec<f32> {
+/// Who draws the casters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Drawn {
+    Meshes,
+    /// A vertex stage of the user's own.
+    OwnVertex,
+    /// A fragment stage as well.
+    OwnFragment,
+}
+
+/// Casters of the user's own, without a fragment stage: one text for all devices. [`corner`] adds the
+/// function `corner`.
+const OWN_VERTEX: &str = "
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> ShadowCaster {
+    return shadow_caster(corner(index));
+}
+";
+
+/// With a fragment stage.
+const OWN_FRAGMENT: &str = "
+struct Own {
+    @builtin(position) clip: vec4f,
+    @location(3) shade: f32,
+    @location(7) depth: vec2f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Own {
+    let caster = shadow_caster(corner(index));
+    return Own(caster.clip, 1.0, caster.depth);
+}
+
+@fragment
+fn fragment(in: Own) -> @builtin(frag_depth) f32 {
+    if (in.shade < 0.5) {
+        discard;
+    }
+    return shadow_fragment_depth(in.depth);
+}
+";
+
+/// A function of WGSL that gives the corners of these triangles in render space.
+fn corner(triangles: &[Vec3], origin: DVec3) -> String {
+    let corners = triangles.iter().map(|p| {
+        let p = (p.as_dvec3() - origin).as_vec3();
+        format!("vec3f({:?}, {:?}, {:?})", p.x, p.y, p.z)
+    });
+    let corners = corners.collect::<Vec<_>>().join(", ");
+    let count = triangles.len();
+    format!(
+        "fn corner(index: u32) -> vec3f {{
+            var corners = array<vec3f, {count}>({corners});
+            return corners[index];
+        }}"
+    )
+}
+
+/// The depths of all maps over a plain, with a slanted sheet that reaches from the ground far above
+/// everything.
+fn depths(emulated: bool, warp: Warp, drawn: Drawn) -> Vec<f32> {
     let bench = bench();
     assert!(bench.support.depth_clip_control, "the device can do both");
     let support = Support { depth_clip_control: !emulated, ..bench.support };
     let mut shadows = Shadows::new(&bench.device, support, &ShadowOptions::default()).unwrap();
+    assert_eq!(shadows.caster_needs_fragment(), emulated);
     let layouts = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
-    let casters = MeshCasters::new(&bench.device, &shadows, MeshKind::Opaque, &layouts);
+    let meshes = MeshCasters::new(&bench.device, &shadows, MeshKind::Opaque, &layouts);
     let triangles: [Vec3; 6] = [
         Vec3::new(-40.0, 0.0, -60.0),
         Vec3::new(40.0, 0.0, -60.0),
@@ -41,16 +101,23 @@ fn depths(emulated: bool, warp: Warp) -> Vec<f32> {
     };
     let plan = plan(&camera(EYE), &[sun()], &technique);
     let instance = bench.instance(CasterInstance::new(&DAffine3::IDENTITY, plan.origin));
+    let corner = corner(&triangles, plan.origin);
+    let own = |text: &str, fragment| bench.own_casters(&shadows, &(corner + text), fragment);
+    let own = match drawn {
+        Drawn::Meshes => None,
+        Drawn::OwnVertex => Some(own(OWN_VERTEX, None)),
+        Drawn::OwnFragment => Some(own(OWN_FRAGMENT, Some("fragment"))),
+    };
     let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
     let mut encoder = bench.encoder();
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
-    let drawn = prepared.encode(&mut encoder, &Timestamps::default(), |map| {
-        map.pass.set_pipeline(casters.pipeline());
+    let maps = prepared.encode(&mut encoder, &Timestamps::default(), |map| {
+        map.pass.set_pipeline(own.as_ref().unwrap_or(meshes.pipeline()));
         map.pass.set_vertex_buffer(0, vertices.slice(..));
         map.pass.set_vertex_buffer(1, instance.slice(..));
         map.pass.draw(0..6, 0..1);
     });
-    assert_eq!(drawn, 2);
+    assert_eq!(maps, 2);
     bench.finish(encoder);
     // And they are where rays find them.
     let (depths, width) = bench.depths(&shadows, 0);
@@ -91,14 +158,45 @@ fn ground(beam: &umbrage::Beam) -> Option<DVec3> {
     Some(beam.origin + beam.direction * t).filter(|p| p.x.abs() < 10.0)
 }
 
+/// Native and emulated depths are the same, to what interpolation in single precision makes of them.
+fn agree(warp: Warp, drawn: Drawn) {
+    let [native, emulated] = [false, true].map(|emulated| depths(emulated, warp, drawn));
+    assert_eq!(native.len(), emulated.len());
+    let clamped = native.iter().filter(|d| **d == 0.0).count();
+    assert!(clamped > 50, "{warp:?} {drawn:?}: something is clamped: {clamped}");
+    let far = native.iter().zip(&emulated).filter(|(a, b)| (**a - **b).abs() > 2e-6).count();
+    assert!(far * 1000 <= native.len(), "{warp:?} {drawn:?}: {far} of {}", native.len());
+}
+
 #[test]
 fn emulated_clamping_gives_the_same_depths() {
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Psm] {
-        let [native, emulated] = [false, true].map(|emulated| depths(emulated, warp));
-        assert_eq!(native.len(), emulated.len());
-        let clamped = native.iter().filter(|d| **d == 0.0).count();
-        assert!(clamped > 50, "{warp:?}: something is clamped: {clamped}");
-        let far = native.iter().zip(&emulated).filter(|(a, b)| (**a - **b).abs() > 2e-6).count();
-        assert!(far * 1000 <= native.len(), "{warp:?}: {far} of {}", native.len());
+        agree(warp, Drawn::Meshes);
+    }
+}
+
+#[test]
+fn one_shader_of_the_users_own_is_right_on_all_devices() {
+    for drawn in [Drawn::OwnVertex, Drawn::OwnFragment] {
+        agree(Warp::Lispsm, drawn);
+    }
+}
+
+/// A vertex stage that drops the caster's depth is refused by devices that need it, and by all of
+/// them in builds with debug assertions.
+#[test]
+fn a_caster_without_its_depth_is_an_error() {
+    let bench = bench();
+    for depth_clip_control in [false, true] {
+        let support = Support { depth_clip_control, ..bench.support };
+        let shadows = Shadows::new(&bench.device, support, &ShadowOptions::default()).unwrap();
+        let text = "@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+            return shadow_caster(vec3f(f32(i))).clip;
+        }";
+        let scope = bench.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let _pipeline = bench.own_casters(&shadows, text, None);
+        let error = pollster::block_on(scope.pop()).map(|e| e.to_string());
+        let is_refused = error.is_some_and(|e| e.contains("is not provided by the previous stage"));
+        assert_eq!(is_refused, !depth_clip_control || cfg!(debug_assertions));
     }
 }

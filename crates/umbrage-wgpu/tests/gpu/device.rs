@@ -162,8 +162,15 @@ impl Bench {
         (rows.collect(), width as usize)
     }
 
-    /// A pipeline of the user's own that draws casters: `wgsl` behind the casters' module in group 0, without vertex buffers.
-    pub(crate) fn own_casters(&self, shadows: &Shadows, wgsl: &str) -> RenderPipeline {
+    /// A pipeline of the user's own that draws casters without vertex buffers: `wgsl` with an entry
+    /// point `vertex` and a fragment stage behind the casters' text in group 0. Without a fragment
+    /// stage of its own it takes what the device needs.
+    pub(crate) fn own_casters(
+        &self,
+        shadows: &Shadows,
+        wgsl: &str,
+        fragment: Option<&str>,
+    ) -> RenderPipeline {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
             source: wgpu::ShaderSource::Wgsl((shadows.caster_wgsl(0) + wgsl).into()),
@@ -178,19 +185,22 @@ impl Bench {
             layout: Some(&layout),
             vertex: wgpu::VertexState {
                 module: &module,
-                entry_point: None,
+                entry_point: Some("vertex"),
                 compilation_options: Default::default(),
                 buffers: &[],
             },
             primitive: shadows.primitive_state(),
             depth_stencil: Some(shadows.depth_stencil_state()),
             multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: None,
-                compilation_options: Default::default(),
-                targets: &[],
-            }),
+            fragment: match fragment {
+                Some(entry_point) => Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    targets: &[],
+                }),
+                None => shadows.caster_fragment(&module),
+            },
             multiview_mask: None,
             cache: None,
         })

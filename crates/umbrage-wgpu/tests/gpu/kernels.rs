@@ -102,7 +102,7 @@ fn random_depths(
             @vertex
             fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{
                 // The map's matrix is not needed, but is there.
-                let unused = shadow_caster_clip(vec3f(0.0)) * 0.0;
+                let unused = shadow_caster(vec3f(0.0)).clip * 0.0;
                 return vec4f(f32((i << 1u) & 2u) * 2.0 - 1.0, f32(i & 2u) * 2.0 - 1.0, 0.0, 1.0) + unused;
             }}
             @fragment
@@ -110,6 +110,7 @@ fn random_depths(
                 return f32(pcg(u32(at.x) + 16384u * u32(at.y)) >> 8u) / 16777216.0;
             }}"
         ),
+        Some("fragment"),
     );
     let frame = Frame { plan, render_origin: origin, casters: Casters::Moved };
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();

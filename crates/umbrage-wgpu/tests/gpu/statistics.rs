@@ -114,11 +114,12 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
                 &shadows,
                 &format!(
                     "@vertex fn vertex(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {{
-                        let unused = shadow_caster_clip(vec3f(0.0)) * 0.0;
+                        let unused = shadow_caster(vec3f(0.0)).clip * 0.0;
                         return vec4f(f32((i << 1u) & 2u) * 2.0 - 1.0, f32(i & 2u) * 2.0 - 1.0, {depth}, 1.0) + unused;
                     }}
                     @fragment fn fragment() {{}}"
                 ),
+                Some("fragment"),
             )
         });
         let partition = umbrage::Partition::slices(4);

@@ -1,4 +1,4 @@
-//! Drafts: maps without a resolution, on which their matrices do not depend.
+//! Drafts: maps without a resolution. Their matrices do not depend on one.
 
 use super::Request;
 use crate::aliasing::Local;
@@ -14,12 +14,12 @@ use crate::warp::{LightSpace, OnePoint, Seen, psm};
 use crate::worst::{self, worst_errors};
 use glam::{DMat3, DMat4, DVec3};
 
-/// What a map has besides itself while it is planned.
+/// What the planner knows about a map besides the map itself.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Draft {
-    /// What the map serves.
+    /// The receivers that the map serves.
     pub(super) body: Body,
-    /// Where a stable map lies, which depends on its resolution.
+    /// The placement of a stable map, whose matrices do depend on its resolution.
     pub(super) stable: Option<Stable>,
 }
 
@@ -27,15 +27,15 @@ pub(super) struct Draft {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drafting {
     seen: Vec<Seen>,
-    /// What a map over the whole scene covers, as seen from the light.
+    /// The points that a map over the whole scene covers, in light space.
     covered: Vec<Seen>,
     worst: worst::Buffers,
 }
 
 impl Drafting {
-    /// Sets all of a map that does not depend on its resolution, and gives its largest errors in s and t
-    /// at one texel, pixels per texel; 0 without anything to serve. A map that is only tried may be a
-    /// little worse.
+    /// Sets everything of a map that does not depend on its resolution. Returns its largest errors
+    /// in s and t if it had one texel, pixels per texel, or 0 if it serves no receivers. If
+    /// `is_trial` is set, the map may be slightly worse.
     pub(super) fn draft(
         &mut self,
         map: &mut ShadowMap,
@@ -45,29 +45,29 @@ impl Drafting {
         is_trial: bool,
         request: &Request<'_>,
     ) -> [f64; 2] {
-        let Request { camera, lamp, technique, .. } = *request;
+        let Request { camera, projector, technique, .. } = *request;
         let Some(middle) = body.middle() else { return [0.0; 2] };
         let covers_scene = technique.cover == Cover::Scene;
         let space = &match along {
-            _ if covers_scene => LightSpace::fixed(lamp, camera),
-            Along::View => LightSpace::following_view(lamp, camera, middle),
-            Along::Side(side) => LightSpace::following_face(lamp, camera, side, middle),
+            _ if covers_scene => LightSpace::fixed(projector, camera),
+            Along::View => LightSpace::following_view(projector, camera, middle),
+            Along::Side(side) => LightSpace::following_face(projector, camera, side, middle),
         };
         let Self { seen, covered, worst, .. } = self;
         let see = |p: DVec3| Seen::new(p, space, camera);
         seen.clear();
         seen.extend(body.vertices().iter().map(|&v| see(v)));
         if space.apex.is_some() {
-            // Under a spot light errors need not be largest at corners. These are points enough to
-            // choose a warp by; the errors reported do not depend on them.
+            // Under a spot light, errors need not be largest at vertices. These additional points
+            // on edges suffice to choose a warp; the errors reported do not depend on them.
             let vertices = body.vertices();
             seen.extend(body.edges().flat_map(|[a, b]| {
                 [0.25, 0.5, 0.75].map(|k| see(vertices[a].lerp(vertices[b], k)))
             }));
         }
         let seen = &*seen;
-        // A map over the whole scene covers what is seen too, whose bounds were widened a little if
-        // they are flat.
+        // A map over the whole scene also covers the points seen, because flat bounds of receivers
+        // were thickened a little.
         let covered: &[Seen] = if covers_scene {
             covered.clear();
             covered.extend(request.whole_scene(space).map(see));
@@ -84,7 +84,7 @@ impl Drafting {
             }
             _ => None,
         };
-        // Errors at one texel decide the resolution.
+        // The errors of a map of one texel determine the resolution.
         map.resolution = [1, 1];
         map.apex = space.apex;
         map.slab = along_axis(space);
@@ -101,8 +101,8 @@ impl Drafting {
         if warp == Warp::Log && nu > 1e-9 {
             map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
         }
-        // Under a spot light `adaptive` has chosen by samples. The promise not to be worse than
-        // `uniform` is kept by looking, which takes too long for slices that are only tried.
+        // Under a spot light `adaptive` chooses a warp from sample points. A comparison of the true
+        // errors ensures that it is never worse than `uniform`. For trials this takes too long.
         let is_checked = !is_trial && space.apex.is_some() && nu > 0.0;
         if warp == Warp::Adaptive(Objective::Storage) && is_checked {
             let mut storage = |nu: f64| {
@@ -121,11 +121,11 @@ impl Drafting {
 }
 
 impl Request<'_> {
-    /// Corners of the whole scene, in local space.
+    /// Corners of the whole scene's bounds, in local space.
     fn whole_scene(&self, space: &LightSpace) -> [DVec3; 8] {
         let eye = self.camera.eye();
         let scene = self.bounds.receivers.map(|r| self.bounds.casters.map_or(r, |c| r.union(c)));
-        match (self.lamp.corners(eye), scene) {
+        match (self.projector.corners(eye), scene) {
             (Some(corners), _) => corners,
             (_, Some(scene)) => scene.relative_to(eye).corners(),
             (_, None) => bounding_cube(self.camera, space),
@@ -157,7 +157,7 @@ impl Default for ShadowMap {
 }
 
 impl ShadowMap {
-    /// An empty map that keeps its buffers.
+    /// Makes the map empty, but keeps its buffers.
     pub(super) fn clear(&mut self, camera: &Camera) {
         let [mut cell, mut caster_planes] =
             [&mut self.cell, &mut self.caster_planes].map(std::mem::take);
@@ -167,7 +167,7 @@ impl ShadowMap {
     }
 }
 
-/// Largest m_s and m_t of a map at the body's vertices.
+/// Largest m_s and m_t of a map over the body's vertices.
 fn unit_errors(map: &ShadowMap, body: &Body, camera: &Camera) -> [f64; 2] {
     let pixel = camera.pixel_width_per_depth();
     body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
@@ -179,7 +179,8 @@ fn unit_errors(map: &ShadowMap, body: &Body, camera: &Camera) -> [f64; 2] {
     )
 }
 
-/// The corners of a cube around the view frustum's bounding sphere, aligned with light space.
+/// The corners of a cube around the view frustum's bounding sphere, with sides along light space's
+/// axes.
 fn bounding_cube(camera: &Camera, space: &LightSpace) -> [DVec3; 8] {
     let (center, radius) = bounding_sphere(camera, [camera.near(), camera.far()]);
     let axes = [space.x, space.y, space.z].map(|row| row.truncate() * radius);

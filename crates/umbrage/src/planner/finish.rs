@@ -1,4 +1,4 @@
-//! From drafts to maps: their resolution, and all that follows from it.
+//! Finishing: the resolutions of drafted maps and everything that depends on them.
 
 use super::draft::Draft;
 use crate::aliasing::Local;
@@ -15,15 +15,19 @@ use crate::technique::{Limits, Size, Technique};
 use crate::worst::{self, worst_errors};
 use glam::{DVec2, DVec3};
 
-/// Casters that lie farther before the receivers than this many of their ranges of depth are flattened in any case: the receivers' own depths need the digits.
+/// The largest distance before the receivers at which casters keep their depths, in ranges of the
+/// receivers' depths. Casters beyond it are clamped, so that the receivers' depths keep enough
+/// digits.
 const MOST_CASTER_DEPTHS: f64 = 1000.0;
 
-/// Casters so many times nearer to a lamp than where the receivers' depths begin are flattened in any case: before a lamp there is no end to depth.
+/// The largest ratio between the distance from a lamp at which the receivers' depths begin and that
+/// of casters which keep their depths. Casters nearer to the lamp are clamped, because depth tends
+/// to infinity there.
 const CLOSEST_TO_LAMP: f64 = 16.0;
 
 /// Checked input.
 #[derive(Clone, Copy)]
-pub(super) struct Finish<'a> {
+pub(super) struct FinishRequest<'a> {
     pub(super) camera: &'a Camera,
     pub(super) bounds: &'a Bounds<'a>,
     pub(super) technique: &'a Technique,
@@ -35,18 +39,19 @@ pub(super) struct Finish<'a> {
 pub(super) struct Finishing {
     worst: worst::Buffers,
     casters: Body,
-    /// (s, t, depth) of a body's corners.
+    /// (s, t, depth) of a body's vertices.
     corners: Vec<DVec3>,
 }
 
-/// How wide a texel is, and how much that is in depth, laid along the beam.
+/// The width of a texel in metres, and the same length along the beam as a difference in depth.
 struct Texel {
     metres: f64,
     depth: f64,
 }
 
 impl Finishing {
-    /// The largest texel at the body's corners, which are kept.
+    /// The largest texel over the body's vertices. Also stores the vertices' shadow coordinates in
+    /// `corners`.
     fn texels(&mut self, map: &ShadowMap, body: &Body) -> Texel {
         self.corners.clear();
         let mut largest = Texel { metres: 0.0, depth: 0.0 };
@@ -59,11 +64,12 @@ impl Finishing {
         largest
     }
 
-    /// How far before depth 0 the first of what can cast into a map lies, in depth, ≥ 0.
+    /// Distance in depth, ≥ 0, from depth 0 to the nearest caster before it that can cast into
+    /// the map.
     fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
         let body = &mut self.casters;
         body.set_box(draft.body.sides(casters.relative_to(map.origin)));
-        // What a stable map holds must not depend on the view.
+        // The depths of a stable map must not depend on the view, as its caster planes do.
         if draft.stable.is_none() {
             map.caster_planes.iter().for_each(|&p| body.clip(p));
         }
@@ -76,7 +82,7 @@ impl Finishing {
             return 0.0;
         }
         let [begin, step] = map.beam_scale(DVec2::splat(0.5));
-        // Distances from a lamp go with one over the fourth coordinate.
+        // Distance from a lamp is inversely proportional to the fourth coordinate.
         let most = if step == 0.0 {
             MOST_CASTER_DEPTHS
         } else {
@@ -85,15 +91,15 @@ impl Finishing {
         (-nearest).clamp(0.0, most)
     }
 
-    /// Gives a map its resolution and all that follows from it.
+    /// Gives a map its resolution and everything that depends on it.
     pub(super) fn finish(
         &mut self,
         map: &mut ShadowMap,
         draft: &Draft,
         size: [u32; 2],
-        request: &Finish<'_>,
+        request: &FinishRequest<'_>,
     ) -> Result<(), Error> {
-        let Finish { camera, bounds, technique, limits } = *request;
+        let FinishRequest { camera, bounds, technique, limits } = *request;
         if draft.body.is_empty() {
             map.resolution = [0, 0];
             return Ok(());
@@ -108,15 +114,16 @@ impl Finishing {
         };
         set(map, size);
         if let Size::MaxError(wanted) = technique.size {
-            // Sizes come from errors in s and t at the body's corners. The worst direction may be another.
-            // Rounding alone is no reason: a stable map's size would change with the view.
+            // Sizes were computed from errors in s and t at the body's vertices, but the worst
+            // direction may be another. The tolerance is for rounding alone, by which a stable
+            // map's size would otherwise change with the view.
             while map.error.max > wanted * (1.0 + 1e-9) {
                 let larger = enlarged(technique, limits, map.resolution, map.error.max / wanted)?;
                 set(map, larger);
             }
         }
         let texel = self.texels(map, &draft.body);
-        // What casts where the filter reads beyond the map counts too.
+        // Casters onto the gutter that the filter reads count as well.
         let reach = f64::from(technique.filter.reach_texels()) * texel.metres;
         map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
         if draft.stable.is_none() {

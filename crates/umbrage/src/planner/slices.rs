@@ -1,4 +1,4 @@
-//! The maps of a part of the view: one for each of its slices.
+//! The maps of one part of the view, one for each slice.
 
 use super::{Draft, Planner, Request};
 use crate::bounds::Plane;
@@ -15,13 +15,13 @@ use glam::DVec2;
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Slicing {
-    /// What a slice that is only tried serves, and its map.
+    /// The receivers of a slice on trial, and its map.
     body: Body,
     trial: ShadowMap,
     outline: Vec<DVec2>,
 }
 
-/// How a part of the view is sliced.
+/// How one part of the view is sliced.
 struct Slices<'a> {
     part: Part,
     along: &'a Along,
@@ -32,12 +32,13 @@ struct Slices<'a> {
 }
 
 impl Planner {
-    /// Appends the maps of all slices of the part whose body is `self.bodies.face`.
+    /// Appends the maps of all slices of the part whose receivers are `self.bodies.face`.
     pub(super) fn draft_slices(&mut self, part: Part, along: &Along, request: &Request<'_>) {
         let technique = request.technique;
         let (mut partition, mut warp) = (technique.partition, technique.warp);
         if part.face == Some(Face::Near) {
-            // All its pixels are of one size.
+            // All pixels on the near face have the same width, so it needs neither slices nor a
+            // warp.
             partition.slices = 1;
             if !matches!(warp, Warp::Adaptive(_)) {
                 warp = Warp::Uniform;
@@ -50,7 +51,7 @@ impl Planner {
         }
     }
 
-    /// Where slices begin and end.
+    /// The ends of a part's slices.
     fn slice_ends(
         &mut self,
         partition: &Partition,
@@ -97,7 +98,8 @@ impl Planner {
         let overlap = if is_last { 0.0 } else { partition.overlap };
         let reach = split[1] + overlap * (split[1] - split[0]).max(0.0);
         let before = |depth| along.plane_at(depth, camera).map(Plane::flipped);
-        // The first slice begins and the last one ends where what is served does.
+        // The first slice begins and the last one ends with the receivers, without planes of their
+        // own.
         let end = before(reach).filter(|_| !is_last);
         let begin = along.plane_at(split[0], camera).filter(|_| slice > 0);
         draft.body.copy_from(&self.bodies.face);
@@ -108,17 +110,17 @@ impl Planner {
         map.cell.push(Plane { normal: -camera.forward(), offset: camera.far() });
         draft.stable = (technique.cover == Cover::Stable).then(|| {
             let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
-            Stable::around(request.lamp, camera, range)
+            Stable::around(request.projector, camera, range)
         });
         let unit = match &draft.stable {
             None => self.drafting.draft(map, &draft.body, along, *warp, false, request),
-            // Beyond the view nothing is ever served.
+            // A slice outside the view's range of distances never serves any receiver.
             Some(_) if split[0] >= camera.far() || reach <= camera.near() => [0.0; 2],
             Some(stable) => stable.unit_errors(),
         };
         self.units.push(unit);
         let around = self.around.iter().chain(&map.cell).copied();
-        let space = LightSpace::fixed(request.lamp, camera);
+        let space = LightSpace::fixed(request.projector, camera);
         let outline = &mut self.slicing.outline;
         caster_planes(&mut map.caster_planes, around, &draft.body, &space, outline);
     }

@@ -1,12 +1,12 @@
-//! Techniques as Rust code, for reports that people copy from.
+//! Techniques as Rust code, for reports whose readers copy it.
 
 use super::{Cover, Faces, Objective, Partition, Size, Splits, Technique, Warp};
 use crate::visibility::statistic::{Statistic, Storage};
 use crate::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 
 impl Technique {
-    /// Rust code that makes this technique: what to `use`, and `let technique = …;`. Fields that are
-    /// as by default are left out.
+    /// Rust code that constructs this technique: the necessary `use` lines and
+    /// `let technique = …;`. Fields with default values are left out.
     pub fn rust_code(&self) -> String {
         let default = Self::default();
         let Self { warp, cover, partition, filter, size } = *self;

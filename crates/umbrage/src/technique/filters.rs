@@ -106,15 +106,15 @@ pub(super) const WORDS: &[Word] = &[
         value: "",
         example: "evsm",
         options: &[BLUR, LEAK, EXPONENT, HALF],
-        meaning: "Exponential variance shadow maps with four numbers to a texel (Lauritzen and McCool \
-                  2008).",
+        meaning: "Exponential variance shadow maps: moments of two exponentials of depth, blurred ahead of \
+                  lookup (Lauritzen and McCool 2008).",
     },
     Word {
         name: "evsm2",
         value: "",
         example: "evsm2",
         options: &[BLUR, LEAK, EXPONENT, HALF],
-        meaning: "Exponential variance shadow maps with two numbers to a texel.",
+        meaning: "Exponential variance shadow maps with one exponential: half the memory, more light leaks.",
     },
     Word {
         name: "msm",
@@ -164,7 +164,7 @@ pub(super) const WORDS: &[Word] = &[
                 name: "bits",
                 value: "16",
                 example: "bits=16",
-                meaning: "Stores 16 bits a number in place of 8.",
+                meaning: "Stores each statistic in 16 bits in place of 8.",
             },
             HALF,
         ],
@@ -173,10 +173,10 @@ pub(super) const WORDS: &[Word] = &[
     },
 ];
 
-/// Comparisons of `pcss` to each side, if none are told.
+/// The default n of `pcss`.
 const DEFAULT_SAMPLES: u32 = 6;
 
-/// The second swing of a Fourier series about 0, the first one above it, is so high.
+/// The height of the first swing above 0 by which a Fourier series rings in shadow.
 const RINGING: f32 = 0.05;
 
 impl FromStr for Filter {
@@ -258,7 +258,8 @@ fn read_csm(written: &Written<'_>) -> Result<Csm, ParseError> {
     }
     let is_good = |a: &f32| *a >= 0.0 && a.is_finite();
     let attenuation = written.number("attenuation", is_good, "a number of at least 0")?;
-    // Half-dark lit surfaces are of no use; of the two cures doubling is wrong in fewer pixels.
+    // Lit surfaces at half brightness are of no use. Of the two remedies, doubling gives fewer
+    // wrong pixels than the offset.
     let scale = scale || !(offset || raw);
     let csm = Csm::new(order, attenuation.unwrap_or(0.0), offset, scale)
         .map_err(|e| ParseError::new(format!("`{}`: {e}", written.text)))?;
@@ -319,7 +320,7 @@ fn read_light(text: &str) -> Result<LightSize, ParseError> {
     }
 }
 
-/// As a technique's text has it: `pcf3`, `csm8(blur=7,offset)`.
+/// The form of a technique's text: `pcf3`, `csm8(blur=7,offset)`.
 impl fmt::Display for Filter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

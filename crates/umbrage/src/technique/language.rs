@@ -1,36 +1,36 @@
 //! The language in which techniques are written: `WARP[+zK][+face][:FILTER][@TEXELS]`.
 //!
-//! [`Technique`] parses and prints it. Every word stands in one of four tables with its options and
-//! a sentence about each; the parser, the printer's tests, [`help`] and the reports' explanations
-//! are all made from these.
+//! [`Technique`] parses and prints this language. Each word stands in one of four tables, with its
+//! options and a sentence about each. The parser, the printer's tests, [`help`] and the
+//! explanations in reports all use these tables.
 
 use super::{Size, Technique, filters, layouts};
 use std::fmt::{self, Display, LowerExp, Write};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// The words of a technique's first part: how texels are spread, and over what.
+/// The words of a technique's first part: how texels are spread and what they cover.
 pub static WARPS: &[Word] = layouts::WARPS;
-/// The words behind a `+`: which maps there are.
+/// The words after a `+`: how the view is divided among maps.
 pub static PARTITIONS: &[Word] = layouts::PARTITIONS;
-/// The words behind the `:`: how maps are looked up.
+/// The words after the `:`: how maps are looked up.
 pub static FILTERS: &[Word] = filters::WORDS;
-/// What can stand behind the `@`: how many texels there are.
+/// The forms after the `@`: how many texels there are.
 pub static SIZES: &[Word] = &layouts::SIZES;
 
-/// A word of the language, and what can follow it.
+/// A word of the language, with its value and options.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// How the word begins: `pcf`.
+    /// The word without its value: `pcf`.
     pub name: &'static str,
-    /// What stands for the value that follows the name at once: `N` in `pcfN`, `=NUMBER` in
+    /// Placeholder of the value that follows the name without a space: `N` in `pcfN`, `=NUMBER` in
     /// `lambda=NUMBER`. Empty for words without a value.
     pub value: &'static str,
-    /// The word with a value that makes sense: `pcf3`.
+    /// The word with a valid value: `pcf3`.
     pub example: &'static str,
-    /// The options that may stand in parentheses behind the word, with commas between them.
+    /// The options that may follow the word in parentheses, separated by commas.
     pub options: &'static [WordOption],
-    /// What the word means, in one sentence.
+    /// The word's meaning in one sentence.
     pub meaning: &'static str,
 }
 
@@ -39,22 +39,23 @@ pub struct Word {
 pub struct WordOption {
     /// The option's name: `blur`.
     pub name: &'static str,
-    /// What stands for the option's value: `WIDTH` in `blur=WIDTH`. Empty for options without one.
+    /// Placeholder of the option's value: `WIDTH` in `blur=WIDTH`. Empty for options without a
+    /// value.
     pub value: &'static str,
-    /// The option with a value that makes sense: `blur=2px`.
+    /// The option with a valid value: `blur=2px`.
     pub example: &'static str,
-    /// What the option means, in one sentence.
+    /// The option's meaning in one sentence.
     pub meaning: &'static str,
 }
 
-/// As the language's tables show it: `pcfN`.
+/// The form in the language's tables: `pcfN`.
 impl Display for Word {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}{}", self.name, self.value)
     }
 }
 
-/// As the language's tables show it: `blur=WIDTH`.
+/// The form in the language's tables: `blur=WIDTH`.
 impl Display for WordOption {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.value {
@@ -64,14 +65,14 @@ impl Display for WordOption {
     }
 }
 
-/// Why a text is no [`Technique`].
+/// Why a text is not a [`Technique`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{problem}{}", did_you_mean(.suggestion.as_deref()))]
 #[non_exhaustive]
 pub struct ParseError {
-    /// Which part of the text is wrong, and why, on one line.
+    /// Which part of the text is wrong and why, on one line.
     pub problem: String,
-    /// What may have been meant: the nearest word of the language, or the same words in their places.
+    /// A correction: the nearest word of the language, or the given words in the right places.
     pub suggestion: Option<String>,
 }
 
@@ -89,14 +90,14 @@ impl ParseError {
     }
 }
 
-/// The name among `names` that is most like `text`; empty if there are none.
+/// The name among `names` that is most similar to `text`; empty if there are no names.
 pub fn nearest<'a>(text: &str, names: impl IntoIterator<Item = &'a str>) -> &'a str {
     let text = text.to_lowercase();
     let distance = |name: &&str| strsim::damerau_levenshtein(name, &text);
     names.into_iter().min_by_key(distance).unwrap_or_default()
 }
 
-/// The whole language on one page of plain text, some 80 columns wide.
+/// The whole language on one page of plain text, about 80 columns wide.
 pub fn help() -> String {
     let mut page = String::from(
         "A technique is written WARP[+zK][+face][:FILTER][@TEXELS], as in\n\
@@ -125,7 +126,7 @@ pub fn help() -> String {
     page
 }
 
-/// A term and its explanation, which begins at column 26 and is broken before column 80.
+/// Appends a term and its explanation, which begins at column 26 and is wrapped before column 80.
 fn paragraph(page: &mut String, indent: usize, term: &str, text: &str) {
     const TEXT: usize = 26;
     const END: usize = 80;
@@ -147,8 +148,8 @@ fn paragraph(page: &mut String, indent: usize, term: &str, text: &str) {
     let _ = writeln!(page, "{line}");
 }
 
-/// What the words of a technique's text mean: each word or option as it is written there, and a
-/// sentence about it. Empty for a text that is no technique.
+/// The meanings of the words in a technique's text: each word and option as written, with a
+/// sentence about it. Empty if the text is not a technique.
 pub fn explain(text: &str) -> Vec<(String, &'static str)> {
     let mut explained = Vec::new();
     if text.parse::<Technique>().is_err() {
@@ -176,7 +177,7 @@ pub fn explain(text: &str) -> Vec<(String, &'static str)> {
     explained
 }
 
-/// A technique's text, cut where its parts meet.
+/// A technique's text, split into its parts.
 struct Parts<'a> {
     warp: &'a str,
     partitions: Vec<&'a str>,
@@ -189,7 +190,7 @@ impl<'a> Parts<'a> {
         let (head, size) = split_once(text, '@');
         let (layout, filter) = split_once(head, ':');
         let mut depth = 0;
-        // An exponent, as in `tsm(focus=1e+3)`, begins no partition.
+        // A `+` within parentheses belongs to an exponent, as in `tsm(focus=1e+3)`.
         let mut parts = layout.split(move |c| {
             depth += i32::from(c == '(') - i32::from(c == ')');
             c == '+' && depth <= 0
@@ -203,9 +204,7 @@ impl FromStr for Technique {
 
     fn from_str(text: &str) -> Result<Self, ParseError> {
         let Parts { warp, partitions, filter, size } = Parts::of(text);
-        if let Some(size) = size
-            && size.contains([':', '+'])
-        {
+        if let Some(size) = size.filter(|size| size.contains([':', '+'])) {
             return Err(ParseError::new(format!(
                 "`@{size}`: `@TEXELS` comes last, as in `uniform:pcf3@1024`"
             )));
@@ -222,7 +221,7 @@ impl FromStr for Technique {
     }
 }
 
-/// The text that parses to the same technique, without what is so by default.
+/// The text that parses to the same technique, without default values.
 impl Display for Technique {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let default = Self::default();
@@ -239,8 +238,8 @@ impl Display for Technique {
 }
 
 impl Technique {
-    /// The part of the technique's text that a planner's complaint is about, by the field that
-    /// [`Error::Invalid`](crate::Error::Invalid) names; `None` for fields of anything else.
+    /// The part of the technique's text that an error is about, given the field that
+    /// [`Error::Invalid`](crate::Error::Invalid) names; `None` for fields outside the technique.
     pub fn part(&self, field: &str) -> Option<String> {
         let field = field.strip_prefix("technique.").unwrap_or(field);
         let mut part = String::new();
@@ -259,7 +258,7 @@ impl Technique {
     }
 }
 
-/// A place in a technique's text, and so a table of words.
+/// A part of a technique's text, which selects a table of words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Warp,
@@ -284,25 +283,25 @@ impl Kind {
         }
     }
 
-    /// What stands before the words where complaints show them.
+    /// The prefix of the words in error messages.
     fn prefix(self) -> &'static str {
         if self == Self::Partition { "+" } else { "" }
     }
 }
 
-/// A word as somebody wrote it, with its value and options, all of them known.
+/// A word as written in a text, with its value and options, all found in the tables.
 pub(super) struct Written<'a> {
-    /// All of it.
+    /// The whole word, including its options.
     pub(super) text: &'a str,
     pub(super) word: &'static Word,
     /// The word's own value, without an `=`.
     pub(super) value: &'a str,
-    /// With their values; empty where there is none.
+    /// The options with their values, which are empty for options without a value.
     options: Vec<(&'static WordOption, &'a str)>,
 }
 
 impl<'a> Written<'a> {
-    /// Finds a word of this kind, and its options.
+    /// Looks up a word of this kind and its options.
     pub(super) fn read(text: &'a str, kind: Kind) -> Result<Self, ParseError> {
         let (words, prefix) = (kind.words(), kind.prefix());
         let (head, options) = split_options(text)?;
@@ -315,7 +314,7 @@ impl<'a> Written<'a> {
         let (word, value) = if let Some(found) = with_equals {
             found
         } else if let Some(word) = named(head).filter(|w| w.value.is_empty()) {
-            // A number may be part of a name.
+            // Some names end in a number, such as `evsm2`.
             (word, "")
         } else if let Some(word) = named(stem).filter(|w| !w.value.starts_with('=')) {
             let shown = format!("{prefix}{text}");
@@ -334,18 +333,18 @@ impl<'a> Written<'a> {
         Ok(Self { text, word, value, options })
     }
 
-    /// Whether an option is there.
+    /// Whether the option is given.
     pub(super) fn has(&self, name: &str) -> bool {
         self.value_of(name).is_some()
     }
 
-    /// An option's value, if the option is there.
+    /// The option's value, if the option is given.
     pub(super) fn value_of(&self, name: &str) -> Option<&'a str> {
         debug_assert!(self.word.options.iter().any(|o| o.name == name), "{name}");
         self.options.iter().find(|(option, _)| option.name == name).map(|(_, value)| *value)
     }
 
-    /// An option's number, if the option is there. `must` says what it must be.
+    /// The option's value as a number, if the option is given. `must` describes valid values.
     pub(super) fn number<T: FromStr>(
         &self,
         name: &str,
@@ -358,7 +357,7 @@ impl<'a> Written<'a> {
         number.map(Some).ok_or_else(problem)
     }
 
-    /// The word's own whole number.
+    /// The word's own value as a whole number.
     pub(super) fn count(
         &self,
         prefix: &str,
@@ -408,7 +407,7 @@ fn read_options<'a>(
     Ok(options)
 }
 
-/// Splits `name(options)`.
+/// Splits `name(options)` into both parts.
 fn split_options(text: &str) -> Result<(&str, Option<&str>), ParseError> {
     match split_once(text, '(') {
         (name, None) if name.contains(')') => {
@@ -427,7 +426,7 @@ pub(super) fn split_once(text: &str, at: char) -> (&str, Option<&str>) {
     text.split_once(at).map_or((text, None), |(a, b)| (a, Some(b)))
 }
 
-/// A whole number in a range; `prefix` is what stands before it.
+/// Parses a whole number in a range. `prefix` is the text before it, for the error message.
 pub(super) fn count(
     text: &str,
     prefix: &str,
@@ -440,7 +439,7 @@ pub(super) fn count(
     })
 }
 
-/// Writes a word with its options.
+/// Writes a word and its options.
 pub(super) fn write_word(
     f: &mut impl Write,
     head: impl Display,
@@ -455,7 +454,7 @@ pub(super) fn write_word(
     f.write_str(if separator == ',' { ")" } else { "" })
 }
 
-/// A number in as few digits as tell it.
+/// A number that is printed with the fewest digits that identify it.
 pub(super) struct Short<T>(pub(super) T);
 
 impl<T: Copy + Display + LowerExp + Into<f64>> Display for Short<T> {

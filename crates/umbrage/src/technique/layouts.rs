@@ -1,4 +1,4 @@
-//! The language's words for what maps there are: warps, partitions, numbers of texels.
+//! The language's words for warps, partitions and numbers of texels.
 
 use super::language::{
     FILTERS, Kind, ParseError, Short, Word, WordOption, Written, count, split_once, write_word,
@@ -23,8 +23,8 @@ pub(super) const WARPS: &[Word] = &[
             name: "stable",
             value: "",
             example: "stable",
-            meaning: "Covers all that the camera may turn to, so that texels stand still in the world \
-                      and shadows do not shimmer.",
+            meaning: "Covers all that the camera may turn to, so that texels keep their places in the \
+                      world and shadows do not shimmer.",
         }],
         meaning: "An even map, focused on the receivers that the camera sees.",
     },
@@ -169,7 +169,7 @@ pub(super) static SIZES: [Word; 4] = [
     },
 ];
 
-/// What comes before the filters' words when somebody wrote a filter alone.
+/// The warp in suggestions for a text that is only a filter.
 const DEFAULT_WARP: &str = "adaptive";
 
 pub(super) fn read_warp(text: &str) -> Result<(Warp, Cover), ParseError> {
@@ -203,7 +203,7 @@ pub(super) fn read_warp(text: &str) -> Result<(Warp, Cover), ParseError> {
     }
 }
 
-/// A warp by itself, without what it covers.
+/// Parses a warp alone, without what it covers.
 impl FromStr for Warp {
     type Err = ParseError;
 
@@ -217,10 +217,10 @@ impl FromStr for Warp {
     }
 }
 
-/// What somebody meant who wrote something other than a warp in its place.
+/// An error with a suggestion for a text that has some other word in the place of the warp.
 fn misplaced(text: &str) -> Option<ParseError> {
     let stem = text.trim_end_matches(|c: char| c.is_ascii_digit());
-    // `csm` is short for cascaded shadow maps, too.
+    // `csm` also abbreviates cascaded shadow maps.
     if ["cascade", "cascades", "cascaded", "csm"].contains(&stem.to_lowercase().as_str()) {
         let count = match &text[stem.len()..] {
             "" => "4",
@@ -261,7 +261,8 @@ pub(super) fn write_warp(f: &mut impl Write, warp: Warp, cover: Cover) -> fmt::R
         Warp::Log => "log".to_owned(),
         Warp::Lambda(metres) => format!("lambda={}", Short(metres)),
     };
-    // Of warped maps that cover more than is seen the language knows nothing, nor does the planner.
+    // The language has no word for warped maps that cover the whole scene, and the planner rejects
+    // them.
     let cover = match cover {
         Cover::Stable => Some("stable".to_owned()),
         Cover::Scene if warp != Warp::Uniform => Some("unfocused".to_owned()),
@@ -315,7 +316,7 @@ fn read_slices(written: &Written<'_>) -> Result<Partition, ParseError> {
     })
 }
 
-/// Distances at which `slices` slices meet, metres, with a slash between them.
+/// Parses the distances at which `slices` slices meet, metres, separated by slashes.
 fn read_distances(text: &str, slices: u32) -> Result<Splits, ParseError> {
     let wanted = slices as usize - 1;
     if wanted == 0 {
@@ -373,10 +374,10 @@ pub(super) fn write_faces(f: &mut impl Write, faces: Faces) -> fmt::Result {
     })
 }
 
-/// The longest side that a size can have, texels.
+/// The longest side in the text of a size, texels.
 const MAX_SIDE: u32 = 1 << 16;
 
-/// Which kind of size a text is.
+/// The kind of size that a text has the form of.
 pub(super) fn size_word(text: &str) -> &'static Word {
     let [budget, exact, error, texels] = &SIZES;
     if text.ends_with("px") {

@@ -1,25 +1,31 @@
-//! The papers' closed forms: how wrong a shadow map of a square view frustum is, before there is any plan.
+//! The papers' closed forms for the aliasing error of a shadow map over a square view frustum,
+//! which need no plan.
 //!
-//! For one parallel light in the plane of the view's y axis and direction, everything follows from five
-//! numbers: n, f, φ ([`View`]), θ ([`Tilted`]) and λ ([`Warped`]). [`overhead`](Overhead) has the simple case
-//! of θ = 90°, [`storage_factor`] the texels that partitions need, [`Tilted::lambda`] the techniques' rules
-//! for λ, [`FourierStep`] the shadow test of convolution shadow maps.
+//! For one parallel light in the plane of the view's y axis and direction, all errors follow from
+//! five numbers: n, f, φ ([`View`]), θ ([`Tilted`]) and λ ([`Warped`]). V is the view frustum
+//! and W the warp's frustum around it. [`Overhead`] is the simple case of θ = 90°.
+//! [`storage_factor`] gives the texels that partitions need, [`Tilted::lambda`] the techniques'
+//! rules for λ, and [`FourierStep`] the shadow test of convolution shadow maps.
 //!
-//! Formulas are those of Wimmer, Scherzer and Purgathofer 2004 (LiSPSM), Lloyd, Tuft, Yoon and Manocha 2006
-//! (W&P), Zhang, Zhao and Sun 2009 (Theory) and Annen, Mertens, Bekaert, Seidel and Kautz 2007 (CSM). Where a paper
-//! has a misprint, the item that implements the formula says so.
+//! The formulas are those of Wimmer, Scherzer and Purgathofer 2004 (LiSPSM), Lloyd, Tuft, Yoon and
+//! Manocha 2006 (W&P), Zhang, Zhao and Sun 2009 (Theory) and Annen, Mertens, Bekaert, Seidel and
+//! Kautz 2007 (CSM). Where a paper has a misprint, the item that implements the formula describes
+//! it.
 //!
 //! # Two units
 //!
-//! W&P's m is pixels per texel. Theory's E is how fast the image's coordinates, each from −1 to 1, move with
-//! the map's, each from 0 to 1: m = E · (res_i/2)/res_map, so that a storage factor S̄ is M_q·M_p/4.
+//! W&P's error m is in pixels per texel. Theory's error E is the derivative of the image's
+//! coordinates, each from −1 to 1, with respect to the map's, each from 0 to 1. So m = E ·
+//! (res_i/2)/res_map, and a storage factor S̄ is M_q·M_p/4.
 //!
 //! # Other lights
 //!
-//! For spot and point lights, light from any side, bounded receivers and for maps as they really are there
-//! are no closed forms. [`aliasing`](crate::aliasing) has the same errors of any planned map at any point:
-//! [`ShadowMap::perspective_error`](crate::ShadowMap::perspective_error) the perspective part m,
-//! [`ShadowMap::surface_error`](crate::ShadowMap::surface_error) with projection.
+//! There are no closed forms for spot and point lights, for parallel light from any other side, for
+//! bounded receivers or for maps of whole texels. [`aliasing`](crate::aliasing) gives the same
+//! errors for any planned map at any point:
+//! [`ShadowMap::perspective_error`](crate::ShadowMap::perspective_error) is the perspective error
+//! m, and [`ShadowMap::surface_error`](crate::ShadowMap::surface_error) includes the projection
+//! error.
 
 mod lambda;
 mod overhead;
@@ -44,8 +50,8 @@ pub struct View {
 }
 
 impl View {
-    /// From the distances n and f at which V begins and ends, metres, 1e-12 ≤ n < f ≤ 1e12, and half its
-    /// field of view φ, radians, 1e-6 ..= π/2 − 1e-6.
+    /// A view frustum from its near and far distance n and f, metres, 1e-12 ≤ n < f ≤ 1e12, and
+    /// half its field of view φ, radians, 1e-6 ..= π/2 − 1e-6.
     ///
     /// # Errors
     ///
@@ -64,17 +70,17 @@ impl View {
         Ok(Self { near, far, half_fov_rad })
     }
 
-    /// n, metres.
+    /// Near distance n, metres.
     pub fn near(&self) -> f64 {
         self.near
     }
 
-    /// f, metres.
+    /// Far distance f, metres.
     pub fn far(&self) -> f64 {
         self.far
     }
 
-    /// φ, radians.
+    /// Half the field of view φ, radians.
     pub fn half_fov_rad(&self) -> f64 {
         self.half_fov_rad
     }
@@ -84,13 +90,13 @@ impl View {
         self.half_fov_rad.tan()
     }
 
-    /// The i-th of k self-similar slices along the view, i from 0: n (f/n)^(i/k) to n (f/n)^((i+1)/k)
-    /// (W&P Eqs. 15, 16).
+    /// Slice i of k self-similar slices along the view, counted from 0: n (f/n)^(i/k) to n
+    /// (f/n)^((i+1)/k) (W&P Eqs. 15, 16).
     ///
     /// # Errors
     ///
-    /// [`Error::Invalid`] with the field `theory.slices` unless i < k, or where f and n are so close that
-    /// a slice has no depth.
+    /// [`Error::Invalid`] with the field `theory.slices` unless i < k, or if f and n are so close
+    /// that a slice has no depth.
     pub fn slice(&self, i: u32, k: u32) -> Result<Self, Error> {
         check(i < k, "theory.slices", || format!("there is no slice {i} of {k}"))?;
         let end = |i: u32| match i {
@@ -106,7 +112,7 @@ impl View {
     }
 }
 
-/// A warp's λ: metres, at least 1e-12, or infinite for no warp.
+/// Checks a warp's λ, metres, at least 1e-12, or infinite for no warp.
 fn check_lambda(lambda: f64) -> Result<(), Error> {
     check(lambda >= 1e-12, "theory.lambda", || {
         format!(

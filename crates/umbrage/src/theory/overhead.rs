@@ -1,23 +1,24 @@
 use super::{View, check_lambda};
 use crate::error::{Error, check};
 
-/// Light at right angles to the view (θ = 90°), and a one-point perspective along the view whose centre lies
-/// λ before V's near plane (W&P §4.1, LiSPSM §4.2).
+/// Light at right angles to the view (θ = 90°), and a one-point perspective along the view, whose
+/// centre of projection lies λ in front of V's near plane (W&P §4.1, LiSPSM §4.2).
 ///
-/// Errors are m, pixels per texel, for an image and a map of one pixel and one texel: multiply by res_i/res_s or
-/// res_i/res_t. The papers let λ vary from n, where the map is as wide as V everywhere, to ∞. Below n, V's
-/// near corners are what W has to hold, and the errors across the map are larger than the papers' forms
-/// say; what is computed here is right for them too.
+/// Errors are m, in pixels per texel, for an image of one pixel and a map of one texel: multiply
+/// them by res_i/res_s or res_i/res_t. In the papers λ ranges from n, where the map is as wide as
+/// V at every depth, to ∞. For λ < n, W's width is determined by V's near corners, and the
+/// errors across the map are larger than in the papers' formulas. The functions here are correct
+/// for such λ too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overhead {
     view: View,
     lambda: f64,
-    /// 1/λ: 0 without a warp, where λ itself makes ∞/∞ of most formulas.
+    /// 1/λ, which is 0 without a warp. With λ itself most formulas would give ∞/∞.
     per_lambda: f64,
 }
 
 impl Overhead {
-    /// With λ in metres, at least 1e-12, or infinite for no warp.
+    /// Light overhead with a warp of this λ, metres, at least 1e-12, or infinite for no warp.
     ///
     /// # Errors
     ///
@@ -32,7 +33,7 @@ impl Overhead {
         self.lambda
     }
 
-    /// z′/λ at view depth z: how much wider W is there than at its near plane.
+    /// z′/λ at view depth z: W's width there over its width at its near plane.
     fn widening(&self, z: f64) -> f64 {
         1.0 + (z - self.view.near) * self.per_lambda
     }
@@ -44,7 +45,7 @@ impl Overhead {
         })
     }
 
-    /// m_s at view depth z, metres, n ..= f: the error across the map (W&P Eq. 7).
+    /// m_s at view depth z, metres, n ..= f: the error across the warp's axis (W&P Eq. 7).
     ///
     /// # Errors
     ///
@@ -56,13 +57,13 @@ impl Overhead {
 
     fn m_s_inside(&self, z: f64) -> f64 {
         let View { near, far, .. } = self.view;
-        // W's width at its near plane, by the corners of V that stick out.
+        // W's width at its near plane, from those corners of V that W must contain.
         let width = (far / self.widening(far)).max(near);
         width * self.widening(z) / z
     }
 
-    /// m_t at view depth z, metres, n ..= f: the error along the map (W&P Eq. 8; LiSPSM Eq. 3 without its
-    /// 2 tan φ; Theory Eq. 9 in units of E).
+    /// m_t at view depth z, metres, n ..= f: the error along the warp's axis (W&P Eq. 8; LiSPSM Eq.
+    /// 3 without its factor 2 tan φ; Theory Eq. 9 in units of E).
     ///
     /// # Errors
     ///
@@ -78,44 +79,46 @@ impl Overhead {
         range * self.widening(z).powi(2) / (z * self.widening(far))
     }
 
-    /// M_s, the largest m_s: at z = n for λ ≥ n (W&P Eq. 9, which is n times too large as printed: its n came
-    /// from a pixel's width that was divided by n in Eq. 2), else at z = f.
+    /// M_s, the largest m_s, which is reached at z = n for λ ≥ n, and otherwise at z = f. (W&P
+    /// Eq. 9 as printed is n times too large, because Eq. 2 divides a pixel's width by n.)
     pub fn max_s(&self) -> f64 {
         self.m_s_inside(self.view.near).max(self.m_s_inside(self.view.far))
     }
 
-    /// M_t, the largest m_t: at z = f for λ ≤ λ_L, else at z = n (W&P Eq. 10).
+    /// M_t, the largest m_t, which is reached at z = f for λ ≤ λ_L, and otherwise at z = n (W&P
+    /// Eq. 10).
     pub fn max_t(&self) -> f64 {
-        // m_t is convex in z.
+        // m_t is convex in z, so its maximum is at an end.
         self.m_t_inside(self.view.near).max(self.m_t_inside(self.view.far))
     }
 
-    /// View depth in metres where m_t is smallest: λ − n, as far as that lies within V.
+    /// View depth at which m_t is smallest, metres: λ − n, clamped to n ..= f.
     pub fn best_depth(&self) -> f64 {
         let View { near, far, .. } = self.view;
         (self.lambda - near).clamp(near, far)
     }
 
-    /// The storage factor S̄ = M_s·M_t: texels needed for an error of at most 1, per pixel of the image
-    /// (W&P Eq. 12). The same for all λ from n to λ_L.
+    /// The storage factor S̄ = M_s·M_t: the number of texels for an error of at most 1, per pixel
+    /// of the image (W&P Eq. 12). It is the same for all λ from n to λ_L.
     pub fn storage_factor(&self) -> f64 {
         self.max_s() * self.max_t()
     }
 
-    /// The critical resolution, texels in s and t: the smallest with which no error exceeds 1 in an image
-    /// of `image_side`² pixels (W&P §4.2).
+    /// The critical resolution, texels in s and t: the smallest with which no error exceeds 1 in an
+    /// image of `image_side`² pixels (W&P §4.2).
     pub fn critical_resolution(&self, image_side: f64) -> [f64; 2] {
         [image_side * self.max_s(), image_side * self.max_t()]
     }
 }
 
-/// Texels in s and t of a map that has `texels` in all and the same largest error both ways: in the ratio of
-/// the critical resolution (W&P Eqs. 13, 14). Not rounded.
+/// Resolution, texels in s and t, of a map that has `texels` texels and the same largest error in
+/// both directions: its sides have the ratio of the critical resolution (W&P Eqs. 13, 14). Not
+/// rounded to whole texels.
 ///
 /// # Errors
 ///
-/// [`Error::Invalid`] with the field `theory.critical_resolution` or `theory.texels` unless all are positive
-/// and finite.
+/// [`Error::Invalid`] with the field `theory.critical_resolution` or `theory.texels` unless all
+/// values are positive and finite.
 pub fn budget_split(critical_resolution: [f64; 2], texels: f64) -> Result<[f64; 2], Error> {
     let is_good = |x: f64| x > 0.0 && x.is_finite();
     let [s, t] = critical_resolution;
@@ -130,14 +133,15 @@ pub fn budget_split(critical_resolution: [f64; 2], texels: f64) -> Result<[f64; 
 }
 
 impl View {
-    /// λ_L = n + √(n f), metres: the λ with the same m_t at the near and the far plane, overhead, and the
-    /// smallest M_t (LiSPSM §4.2).
+    /// λ_L = n + √(n f), metres. With light overhead, this λ gives equal m_t at the near and
+    /// the far plane, and the smallest M_t (LiSPSM §4.2).
     pub fn lambda_l(&self) -> f64 {
         self.near + (self.near * self.far).sqrt()
     }
 
-    /// λ in metres of W&P's parameter η (Eq. 11), −1 ..= 1: η = −1, 0, 1 are no warp (λ = ∞), λ_L and n.
-    /// Overhead, M_t is linear in η on both sides of 0 (their Appendix B).
+    /// λ in metres for W&P's parameter η (Eq. 11), −1 ..= 1: η = −1 is no warp (λ = ∞),
+    /// η = 0 is λ_L, and η = 1 is n. With light overhead, M_t is linear in η on each side of 0
+    /// (their Appendix B).
     ///
     /// # Errors
     ///
@@ -156,11 +160,12 @@ impl View {
             })
     }
 
-    /// η of a λ, metres, at least n, or infinite: the inverse of [`lambda_from_eta`](Self::lambda_from_eta).
+    /// η of a λ of at least n, metres, or infinite: the inverse of
+    /// [`lambda_from_eta`](Self::lambda_from_eta).
     ///
     /// # Errors
     ///
-    /// [`Error::Invalid`] with the field `theory.lambda`: below n there is no η.
+    /// [`Error::Invalid`] with the field `theory.lambda` for λ < n, which has no η.
     pub fn eta_from_lambda(&self, lambda: f64) -> Result<f64, Error> {
         let near = self.near;
         check(lambda >= near, "theory.lambda", || {
@@ -168,7 +173,7 @@ impl View {
         })?;
         let alpha = self.far / near;
         let root = alpha.sqrt();
-        // n/λ: 0 without a warp.
+        // n/λ, which is 0 without a warp.
         let l = near / lambda;
         Ok(if lambda >= self.lambda_l() {
             ((root + 1.0) * l - 1.0) / (1.0 + (alpha - 1.0) * l)
@@ -177,8 +182,9 @@ impl View {
         })
     }
 
-    /// Error along the map of the logarithmic parameterization, overhead, everywhere:
-    /// m_t = ln(f/n)/(2 tan φ). Across the map it is 1 everywhere (W&P Appendix C, LiSPSM §4.2).
+    /// Error along the warp's axis of the logarithmic parameterization with light overhead, which
+    /// is the same everywhere: m_t = ln(f/n)/(2 tan φ). The error across the axis is 1 everywhere
+    /// (W&P Appendix C, LiSPSM §4.2).
     pub fn log_error(&self) -> f64 {
         (self.far / self.near).ln() / (2.0 * self.tan_phi())
     }

@@ -2,37 +2,44 @@ use super::{Overhead, Rule, Tilted, View, Warped};
 use crate::error::{Error, check};
 use crate::technique::{Faces, Partition};
 
-/// Where parallel light comes from, as W&P §5.3 has it.
+/// Direction of parallel light, as in W&P §5.3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightFrom {
-    /// At right angles to the view, θ = 90°.
+    /// Light at right angles to the view, θ = 90°.
     Overhead,
-    /// From behind the viewer, along the view: θ = 0.
+    /// Light from behind the viewer along the view direction, θ = 0.
     Behind,
-    /// At this angle θ to the view, radians, 0 ..= π, in the plane of the view's y axis and direction.
+    /// Light at this angle θ to the view, radians, 0 ..= π, in the plane of the view's y axis and
+    /// direction.
     Angle(f64),
 }
 
-/// The storage factor S̄ of a view cut into self-similar slices and faces: texels that all maps together need for
-/// an error of at most one pixel per texel, per pixel of the image.
+/// The storage factor S̄ of a view cut into self-similar slices and faces: the number of texels
+/// that all maps together need for an error of at most one pixel per texel, per pixel of the image.
 ///
-/// Overhead it is the sum over slices of W&P's Eq. 12, that is Eqs. 17 and 18, and faces change nothing, as the light
-/// sees one of them only (Eq. 19). From behind it is Eq. 20 without faces; with faces, each of the four sides
-/// is a view of φ = 45° under light overhead, and the near face needs one texel a pixel (Eq. 21). At other
-/// angles each slice needs M_q·M_p/4 with its own λ, by the [extrema](Warped::extrema) of Theory's errors.
-/// [`Rule::Log`] reaches the optimum ln(f/n)/(2 tan φ) overhead (W&P Appendix C), with any number of slices.
+/// - With light overhead S̄ is the sum of W&P's Eq. 12 over the slices, which gives Eqs. 17 and
+///   18. Faces change nothing, because the light sees only one of them (Eq. 19).
+/// - With light from behind and no faces S̄ is Eq. 20. With faces, each of the four side faces is
+///   a view of φ = 45° under light overhead, and the near face needs one texel per pixel (Eq.
+///   21).
+/// - With light at other angles each slice needs M_q·M_p/4 with its own λ, from the
+///   [extrema](Warped::extrema) of Theory's errors.
 ///
-/// A [`Rule::Tsm`]'s focus counts in each slice, and for faces from behind along the face; a [`Rule::Lambda`]
-/// is the same in all.
+/// [`Rule::Log`] reaches the optimum ln(f/n)/(2 tan φ) with light overhead (W&P Appendix C) for
+/// any number of slices. The focus of a [`Rule::Tsm`] applies to each slice; for faces with light
+/// from behind it is a distance along the face. The λ of a [`Rule::Lambda`] is the same for all
+/// maps.
 ///
 /// # Errors
 ///
 /// [`Error::Invalid`] with the field
 ///
-/// - `theory.slices` unless 1 ≤ `slices` ≤ [`Partition::MAX_SLICES`], or where V is too short for them;
-/// - `theory.faces` where there is no closed form: for faces with light neither overhead nor behind, and
-///   without the near face with light behind;
-/// - `theory.theta_rad`, `theory.lambda` or `theory.focus` for the numbers of light and rule.
+/// - `theory.slices` unless 1 ≤ `slices` ≤ [`Partition::MAX_SLICES`], or if V is too short for
+///   them;
+/// - `theory.faces` where there is no closed form: for faces with light neither overhead nor from
+///   behind, and for faces without the near face with light from behind;
+/// - `theory.theta_rad`, `theory.lambda` or `theory.focus` for invalid numbers of the light or the
+///   rule.
 pub fn storage_factor(
     view: View,
     rule: Rule,
@@ -64,7 +71,8 @@ pub fn storage_factor(
     }
 }
 
-/// A side face of V as light from behind sees it: a frustum of φ = 45°, whose depth is the distance from V's axis.
+/// A side face of V as seen by light from behind: a frustum of φ = 45°, whose view depth is the
+/// distance from V's axis.
 fn side_from_behind(view: View) -> View {
     let tan_phi = view.tan_phi();
     View {
@@ -89,7 +97,8 @@ fn tilted(view: View, rule: Rule, theta_rad: f64) -> Result<f64, Error> {
     if rule != Rule::Log {
         return Ok(extrema.storage_factor());
     }
-    // Both are proportional to z_w/z, so both are largest at the same place.
+    // E_q and the logarithmic error are both proportional to z_w/z, so both are largest at the same
+    // point.
     let worst = extrema.q.largest;
     Ok(worst.value * warped.log_error(worst.y, worst.z)? / 4.0)
 }

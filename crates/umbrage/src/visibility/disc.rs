@@ -1,13 +1,15 @@
-//! Places in a disc, none near another.
+//! Places in a disc that keep a distance from each other.
 
-/// The most places that there are.
+/// The number of places.
 pub(super) const MAX_PLACES: usize = 64;
 
-/// Poisson-disc places in the disc of diameter 1 around 0: each is, of a number of random candidates, the one farthest from all before it (Mitchell 1991) and
-/// a third as much, from its own mirror image beyond the rim, or the rim would draw too many; so the first n of them are spread evenly for every n.
+/// Poisson-disc places in the disc of diameter 1 around 0. Each place is the best of some random
+/// candidates: the one farthest from all places before it (Mitchell 1991) and from its own mirror
+/// image beyond the rim. The distance to the image counts three times, because otherwise too many
+/// places would lie on the rim. The first n places are spread evenly for every n.
 pub(super) const PLACES: [[f32; 2]; MAX_PLACES] = places();
 
-/// Candidates for each place.
+/// Number of random candidates for each place.
 const CANDIDATES: usize = 24;
 
 const fn places() -> [[f32; 2]; MAX_PLACES] {
@@ -51,7 +53,7 @@ const fn places() -> [[f32; 2]; MAX_PLACES] {
     places
 }
 
-/// The square root of what is at most 1/4 (`f32::sqrt` is not const).
+/// The square root of a number of at most 1/4 (`f32::sqrt` is not const).
 const fn root(square: f32) -> f32 {
     let mut root = 0.5;
     let mut step = 0;
@@ -74,7 +76,7 @@ mod tests {
             let mut square = 0.0;
             for (i, &[x, y]) in places.iter().enumerate() {
                 assert!(x.hypot(y) <= 0.5);
-                // Discs of this diameter around n places take up a quarter of the area.
+                // Discs of this diameter around n places cover a quarter of the area.
                 let least = 0.5 / (n as f32).sqrt();
                 for &[u, v] in &places[..i] {
                     assert!((x - u).hypot(y - v) > least, "{n}: {x} {y}, {u} {v}");
@@ -84,7 +86,7 @@ mod tests {
                 square += (x * x + y * y) / n as f32;
             }
             assert!(mean[0].hypot(mean[1]) < 0.3 / (n as f32).sqrt(), "{n}: {mean:?}");
-            // 1/8 in the mean over the disc.
+            // The mean over the disc is 1/8.
             assert!((square - 0.125).abs() < 0.25 / n as f32 + 0.01, "{n}: {square}");
         }
     }

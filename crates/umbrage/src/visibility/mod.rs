@@ -1,36 +1,42 @@
-//! The shadow test and its filters, as pure functions over whatever holds the depths.
+//! The shadow test and its filters, as pure functions that read depths from any source.
 //!
 //! # Bias
 //!
-//! None is set by hand. Perspective maps take planes to planes, so the depth of the receiver's plane
-//! at a texel's centre is known exactly ([`Receiver::slope`]). A texel hides the receiver if its
-//! depth is less than
+//! No bias is set by hand. Projective maps take planes to planes, so the depth of the receiver's
+//! plane is known exactly at a texel's centre ([`Receiver::slope`]; this is receiver plane depth
+//! bias). A texel hides the receiver if its depth is less than
 //!
-//! > min(depth of the receiver's plane at the texel's centre, the receiver's own depth) − h − 2⁻²⁵
+//! > min(depth of that plane at the texel's centre, the receiver's own depth) − h − 2⁻²⁵
 //!
-//! - The plane alone is exact for planes, but calls a receiver hidden by what lies deeper than
-//!   itself, where the surface bends away within a texel; hence the minimum.
-//! - h is half a texel's width, laid along the beam ([`Receiver::half_texel`]). Where a surface bends
-//!   towards the light within a texel it rises over the plane. The map knows nothing finer than
-//!   its texels, so it cannot tell such a rise from an occluder that close.
+//! - The plane's depth alone is exact for plane surfaces. Where the surface bends away from the
+//!   light within a texel, however, texels deeper than the receiver would hide it; the minimum
+//!   prevents this.
+//! - h is half a texel's width, measured as depth along the beam ([`Receiver::half_texel`]). Where
+//!   a surface bends towards the light within a texel, it rises above the receiver's plane. A map
+//!   resolves nothing smaller than its texels, so it cannot distinguish such a rise from an
+//!   occluder this near.
 //! - 2⁻²⁵ is half a unit in the last place of depths stored in single precision.
 //!
-//! What lies before the receivers is stored as depth 0, clamped, and hides everything: the limit is never
-//! less than 2⁻²⁵, unless the receiver's own plane lies before depth 0 at the texel's centre. Planned maps
-//! leave so much room before the receivers that this takes a surface nearly edge-on.
+//! Casters in front of the receivers are clamped to depth 0 and must hide every receiver. The limit
+//! is therefore never less than 2⁻²⁵, unless the receiver's own plane lies in front of depth 0
+//! at the texel's centre. Planned maps leave enough depth in front of the receivers that this
+//! happens only to surfaces nearly edge-on to the light.
 //!
-//! Measured as the share of wrong pixels (`hard`, one `adaptive` map of 2048², geometric mean over twelve
-//! views of six real scenes at 960×540 against ray-traced truth): the plane alone 0.0173; the minimum
-//! 0.0127; the minimum with h 0.0085. In place of h, the standard deviation of the plane's depth over
-//! a texel (Lauritzen 2008, GPU Gems 3, §8.4.2) gives 0.0098, and lets light through where
-//! surfaces are steep to it; the smaller of the two 0.0089; half of h 0.0087. Most of what is left is
-//! the texels' stair-steps.
+//! Measured as the share of wrong pixels (`hard`, one `adaptive` map of 2048² texels, geometric
+//! mean over twelve views of six real scenes at 960×540 pixels against ray-traced truth): the
+//! plane alone gives 0.0173, the minimum 0.0127, and the minimum with h 0.0085. In place of h, the
+//! standard deviation of the plane's depth over a texel (Lauritzen 2008, GPU Gems 3, §8.4.2) gives
+//! 0.0098 and lets light through on surfaces steep to the light; the smaller of both gives 0.0089,
+//! half of h 0.0087. Most of the remaining errors are stair-steps of the texels.
 //!
-//! # Filters that are applied ahead of lookup
+//! # Prefilters
 //!
-//! [`Prefilter`] stores numbers in place of depth whose means over many texels tell the lit share ([`statistic`]). A blur in texels is done once
-//! a map, and a lookup is one bilinear sample; one in pixels or metres takes several, of smaller and smaller copies. The same slack applies. What cannot tell the receiver's own slanted plane from
-//! occluders also allows for a multiple of that plane's deviation over the filter.
+//! A [`Prefilter`] is applied ahead of lookup. It stores [statistics](statistic) of depth, whose
+//! means over many texels determine the lit share. A blur whose width is given in texels is done
+//! once for each map, and lookup is one bilinear sample. A blur whose width is given in pixels or
+//! metres takes several samples of the map's smaller mip levels. The slack h + 2⁻²⁵ applies to
+//! both. A statistic that cannot distinguish the receiver's own slanted plane from occluders also
+//! allows for a multiple of the standard deviation of that plane's depth over the filter.
 
 pub mod statistic;
 
@@ -46,64 +52,70 @@ use crate::plan::{Receiver, ShadowMap};
 use glam::DVec2;
 use statistic::Channels;
 
-/// Half a unit in the last place of single precision below 1.
+/// Half a unit in the last place of single precision for numbers just below 1.
 const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
 
-/// Gutter of filters whose width in texels has no end: what they would see beyond counts as the gutter's last texel.
+/// Gutter of filters whose width in texels is unbounded, texels. They read the gutter's last texel
+/// in place of texels beyond it.
 const SPREAD_REACH: u32 = 16;
 
-/// How far outside [0, 1]² shadow coordinates still count as inside.
+/// How far outside [0, 1]² shadow coordinates still count as inside, to allow for rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// How the texels around a point are looked up.
+/// How the texels around a receiver are looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Filter {
-    /// The nearest texel.
+    /// One comparison with the nearest texel.
     #[default]
     Hard,
-    /// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the share of lit texels in a box
-    /// of n × n texels centred at the point. The box is exact: texels count by the area of theirs
-    /// that it covers, so (n + 1)² of them are compared, which is what n × n bilinear comparisons of
-    /// a GPU see.
+    /// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the share of lit texels in a
+    /// box of n × n texels, centred at the receiver. Each texel is weighted by the area of it that
+    /// the box covers. So (n + 1)² texels are compared, which are the texels that n × n bilinear
+    /// comparisons of a GPU read.
     Pcf {
         /// Width of the box, texels, even or odd; clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF).
         n: u32,
     },
-    /// Percentage-closer filtering over a width that knows the warp: n × n comparisons with the nearest texels, spread evenly over a square across the
-    /// light or in the picture, or over a texel where that is wider.
+    /// Percentage-closer filtering over a width that does not depend on warp or resolution:
+    /// comparisons with the nearest texels at n × n places of a square or disc. The width is at
+    /// least one texel.
     Spread {
-        /// Comparisons to each side, clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF), or [`MAX_DISC`](Self::MAX_DISC) in a disc.
+        /// There are n² comparisons. n is clamped to 1 ..= [`MAX_PCF`](Self::MAX_PCF), or in a
+        /// disc to 1 ..= [`MAX_DISC`](Self::MAX_DISC).
         n: u32,
-        /// Side of the square, or diameter of the disc.
+        /// Side of the square or diameter of the disc.
         width: Width,
-        /// Where they are made.
+        /// Where the comparisons are made.
         pattern: Pattern,
     },
-    /// Percentage-closer soft shadows (Fernando 2005): a search for what hides the receiver, over all that could hide some of the light from it, tells how
-    /// wide the penumbra is; then as many comparisons over that width. Plans for this filter
-    /// [keep the depths of casters](Self::keeps_casters).
+    /// Percentage-closer soft shadows (Fernando 2005). First, a search among all texels that can
+    /// hide some of the light from the receiver finds the mean width of the penumbra; then
+    /// comparisons over that width give the lit share. Plans for this filter [keep the depths of
+    /// casters](Self::keeps_casters).
     Pcss {
-        /// n² comparisons in the search, and as many in the penumbra; clamped to 1 ..= [`MAX_DISC`](Self::MAX_DISC).
+        /// There are n² comparisons in the search and as many over the penumbra. n is clamped to 1
+        /// ..= [`MAX_DISC`](Self::MAX_DISC).
         n: u32,
-        /// How large the light is: an angle for directional lights, metres for lamps.
+        /// Size of the light: an angle for directional lights, a length for spot and point lights.
         light: LightSize,
     },
-    /// Numbers in place of depths, filtered ahead of lookup.
+    /// A filter that is applied ahead of lookup to statistics of depth.
     Prefiltered(Prefilter),
 }
 
 /// Where comparisons are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pattern {
-    /// On an even grid of n × n places in a square.
+    /// On a regular grid of n × n places in a square.
     #[default]
     Grid,
-    /// At n² places in a disc, none near another, without an order that shows as bands.
+    /// At n² places in a disc, none close to another and without a regularity that would show as
+    /// bands.
     Poisson,
 }
 
 impl Pattern {
-    /// Place k of n², where the square's side and the disc's diameter is 1.
+    /// Place k of n² around 0; the square's side or the disc's diameter is 1.
     fn place(self, k: u32, n: u32) -> [f64; 2] {
         match self {
             Self::Grid => [k % n, k / n].map(|i| (f64::from(i) + 0.5) / f64::from(n) - 0.5),
@@ -112,13 +124,15 @@ impl Pattern {
     }
 }
 
-/// The texels of a map, for lookups. A function from (i, j) to depth is one: it is asked for as many depths as a filter needs.
+/// The texels of a map, for lookups. Functions from (i, j) to depth implement this trait; lookup
+/// calls them once for each depth that a filter needs.
 pub trait Texels {
-    /// Depth of texel (i, j), also of those up to [`Filter::reach_texels`] outside the map.
+    /// Depth of texel (i, j), which may lie up to [`Filter::reach_texels`] outside the map.
     fn depth(&self, i: i32, j: i32) -> f32;
 
-    /// What a prefiltered map has at a point in the map's texel coordinates, between texels bilinearly, at a level: at 1 of half the map's resolution, at 2
-    /// of a quarter … By default computed there and then, from the depths around.
+    /// The prefiltered map's statistics at a point in the map's texel coordinates, bilinearly
+    /// interpolated on mip level `level` (level 1 has half the map's resolution, level 2 a quarter,
+    /// and so on). By default they are computed from the surrounding depths.
     fn statistics(
         &self,
         map: &ShadowMap,
@@ -137,13 +151,14 @@ impl<F: Fn(i32, i32) -> f32> Texels for F {
 }
 
 impl Filter {
-    /// Widest box of [`Pcf`](Self::Pcf), texels.
+    /// The widest box of [`Pcf`](Self::Pcf), texels.
     pub const MAX_PCF: u32 = 15;
 
-    /// The most comparisons to each side over a disc: n² of them.
+    /// The largest n of filters with n² comparisons in a disc.
     pub const MAX_DISC: u32 = 8;
 
-    /// The first `count` places of [`Pattern::Poisson`] in a disc of diameter 1 around 0, at most n² for n = [`MAX_DISC`](Self::MAX_DISC).
+    /// The first `count` places of [`Pattern::Poisson`], in a disc of diameter 1 around 0; there
+    /// are n² places for n = [`MAX_DISC`](Self::MAX_DISC).
     pub fn disc_places(count: u32) -> &'static [[f32; 2]] {
         &disc::PLACES[..(count as usize).min(disc::MAX_PLACES)]
     }
@@ -151,7 +166,7 @@ impl Filter {
     /// Percentage-closer filtering over `n` × `n` texels.
     ///
     /// # Errors
-    /// If `n` is not 1 to [`MAX_PCF`](Self::MAX_PCF).
+    /// If `n` is not in 1 ..= [`MAX_PCF`](Self::MAX_PCF).
     pub fn pcf(n: u32) -> Result<Self, Error> {
         check((1..=Self::MAX_PCF).contains(&n), "filter.n", || {
             format!("must be 1 to {} texels, is {n}", Self::MAX_PCF)
@@ -159,7 +174,7 @@ impl Filter {
         Ok(Self::Pcf { n })
     }
 
-    /// How many texels beyond the map's border lookups of points in the map can reach.
+    /// How many texels beyond the map's border lookups of receivers within the map can read.
     pub fn reach_texels(self) -> u32 {
         match self {
             Self::Hard => 0,
@@ -169,16 +184,20 @@ impl Filter {
         }
     }
 
-    /// Whether maps must tell how far casters lie, so that a plan's depths begin where the casters do
-    /// rather than where the receivers do. Casters nearer the light are flattened otherwise, which
-    /// shadow tests do not mind. It costs depth some of its digits, so there is an end: 1000 times the
-    /// receivers' range of depth, and a sixteenth of their distance from a lamp. Without known
-    /// [casters](crate::Bounds::casters) it changes nothing.
+    /// Whether lookup needs the depths of casters. If so, a plan's range of depths begins at the
+    /// casters and not at the receivers. Otherwise casters nearer the light are clamped to depth 0,
+    /// which plain shadow tests allow.
+    ///
+    /// The longer range costs precision of depth, so it is limited to 1000 times the receivers' own
+    /// range, and under a lamp it begins at no less than a sixteenth of the receivers' distance
+    /// from the lamp. It changes nothing if the [casters'](crate::Bounds::casters) bounds are
+    /// unknown.
     pub fn keeps_casters(self) -> bool {
         matches!(self, Self::Pcss { .. })
     }
 
-    /// What the sides of a map with its gutters are rounded up to, texels. What is more lies behind the gutter's end, and is drawn like it.
+    /// The sides of a map including its gutters are rounded up to multiples of this number of
+    /// texels. The additional texels lie beyond the far gutter and are drawn like it.
     pub fn align_texels(self) -> u32 {
         match self {
             Self::Prefiltered(prefilter) => prefilter.align_texels(),
@@ -186,15 +205,18 @@ impl Filter {
         }
     }
 
-    /// Sides of what is drawn for a map: its resolution, the gutter around it, and what that is rounded up to. Texel coordinates in it run from
+    /// Sides of the rectangle that is drawn for a map, texels: its resolution and its gutters,
+    /// rounded up to [`align_texels`](Self::align_texels). Texel coordinates in it begin at
     /// −[`reach_texels`](Self::reach_texels).
     pub fn drawn_texels(self, resolution: [u32; 2]) -> [u32; 2] {
         let gutters = 2 * self.reach_texels();
         resolution.map(|n| n.saturating_add(gutters).next_multiple_of(self.align_texels()))
     }
 
-    /// Sides of what a map takes in an atlas, between gutters of [`reach_texels`](Self::reach_texels): its resolution, and what that is rounded up to
-    /// ([`drawn_texels`](Self::drawn_texels)). In an atlas of such rectangles maps begin where smaller copies ask for it. Empty maps take nothing.
+    /// Sides of a map's slot in an atlas, texels, without the gutters of
+    /// [`reach_texels`](Self::reach_texels): those of the [drawn](Self::drawn_texels) rectangle
+    /// less both gutters. In an atlas of such slots all maps begin at multiples of the largest mip
+    /// level's texel. The slot of an empty map has no texels.
     pub fn slot_texels(self, resolution: [u32; 2]) -> [u32; 2] {
         if resolution.contains(&0) {
             return resolution;
@@ -203,10 +225,10 @@ impl Filter {
         self.drawn_texels(resolution).map(|n| n - gutters)
     }
 
-    /// That the parameters make sense.
+    /// Checks that all parameters are in their ranges.
     ///
     /// # Errors
-    /// Names the one that does not.
+    /// Names the parameter that is out of its range.
     pub fn check(&self) -> Result<(), Error> {
         match self {
             Self::Hard => Ok(()),
@@ -232,21 +254,22 @@ fn check_disc(n: u32) -> Result<(), Error> {
     })
 }
 
-/// Where shadow coordinates lie in the map's texels: texel (i, j) spans [i, i+1] × [j, j+1].
+/// Texel coordinates of shadow coordinates in a map: texel (i, j) covers [i, i+1] × [j, j+1].
 pub fn texel_coordinates(map: &ShadowMap, st: DVec2) -> DVec2 {
     let [width, height] = map.resolution.map(f64::from);
     DVec2::new(st.x * width, map.rows.row_from_t(st.y) * height)
 }
 
-/// The shadow coordinates of a place in the map's texels: the inverse of [`texel_coordinates`].
+/// Shadow coordinates of texel coordinates in a map: the inverse of [`texel_coordinates`].
 pub fn shadow_coordinates(map: &ShadowMap, texel: DVec2) -> DVec2 {
     let [width, height] = map.resolution.map(f64::from);
     DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height))
 }
 
-/// How much of the light reaches `receiver`, from 0 to 1, by `map`'s texels: a function from (i, j) to depth, also of those up to
-/// [`Filter::reach_texels`] outside the map, or what holds more than depths. Receivers outside the map, or before its
-/// depths, are lit.
+/// The share of the light that reaches `receiver`, 0 ..= 1, from the texels of `map`. `texels` is a
+/// function from (i, j) to depth, or a type that also stores prefiltered statistics; it is asked
+/// for texels up to [`Filter::reach_texels`] outside the map. Receivers outside the map or in front
+/// of its range of depths are lit.
 #[expect(clippy::needless_pass_by_value, reason = "functions are handed over as they are written")]
 pub fn visibility(
     map: &ShadowMap,
@@ -255,7 +278,8 @@ pub fn visibility(
     texels: impl Texels,
 ) -> f32 {
     let st = receiver.st;
-    // What is served lies in the map up to rounding, at the border of its part as well.
+    // Because of rounding, receivers at the border of a map's part may lie slightly outside the
+    // map.
     let is_inside =
         st.cmpge(DVec2::splat(-ROUNDING)).all() && st.cmple(DVec2::splat(1.0 + ROUNDING)).all();
     if map.is_empty() || !is_inside || receiver.depth < 0.0 {
@@ -264,7 +288,7 @@ pub fn visibility(
     let texel = texel_coordinates(map, st);
     let test = Test::new(map, receiver);
     let is_lit = |i, j| f64::from(texels.depth(i, j)) >= test.nearest_lit(i, j);
-    // Of the texels around, those that a pattern over a width falls on.
+    // The nearest texel to each place of a pattern that spans a width.
     let spread = |metric, pattern, n| {
         let ends = drawn(map, filter);
         offsets(metric, pattern, n).map(move |offset| nearest(texel + offset, ends))
@@ -296,7 +320,8 @@ pub fn visibility(
             let source = light.diameter();
             let across = |width: f64| receiver.texel_metric.map(|m| m * width * width);
             let penumbra = |st, depth| f64::from(source) * map.penumbra(receiver, st, depth);
-            // What hides some of the light lies between here and it, where the map's depths begin at the latest.
+            // Occluders lie between the receiver and the light, at depths of 0 or more. Those at
+            // depth 0 cast the widest penumbra, so the search covers its width.
             let (mut widths, mut hidden) = (0.0, 0u32);
             for [i, j] in spread(across(penumbra(st, 0.0)), Pattern::Poisson, n) {
                 if !is_lit(i, j) {
@@ -320,21 +345,23 @@ pub fn visibility(
     }
 }
 
-/// Where what is drawn for a map begins and ends, in texel coordinates; the end is just inside.
+/// The lowest and the highest texel coordinates of what is drawn for a map; the highest are those
+/// of a place just inside the last texel.
 fn drawn(map: &ShadowMap, filter: Filter) -> [DVec2; 2] {
     let low = DVec2::splat(-f64::from(filter.reach_texels()));
     let [width, height] = filter.drawn_texels(map.resolution).map(f64::from);
     [low, low + DVec2::new(width, height) - 1e-3]
 }
 
-/// The texel around a place, of those that are drawn.
+/// The texel at a place, or the nearest to it of the texels that are drawn.
 fn nearest(place: DVec2, [low, high]: [DVec2; 2]) -> [i32; 2] {
     place.clamp(low, high).floor().to_array().map(|i| i as i32)
 }
 
-/// Places of a pattern over a width of this metric (squares of the texels in s and t, and their product), or over a texel where that is wider.
+/// Offsets in texels of a pattern's places over a width with this metric (texels²: squared extents
+/// in s and t, and their product), which is enlarged to at least one texel each way.
 fn offsets([ss, tt, st]: [f64; 3], pattern: Pattern, n: u32) -> impl Iterator<Item = DVec2> {
-    // The sides of the square, as they lie in the map.
+    // Sides of the parallelogram that the square becomes in the map.
     let across = ss.max(1.0).sqrt();
     let shear = st / across;
     let along = (tt - shear * shear).max(1.0).sqrt();
@@ -344,11 +371,11 @@ fn offsets([ss, tt, st]: [f64; 3], pattern: Pattern, n: u32) -> impl Iterator<It
     })
 }
 
-/// A receiver against the texels of a map.
+/// The comparison of one receiver with the texels of a map.
 struct Test<'a> {
     map: &'a ShadowMap,
     receiver: &'a Receiver,
-    /// How much nearer than expected a texel's depth may be.
+    /// How much less than the expected depth a lit texel's depth may be.
     slack: f64,
 }
 
@@ -357,31 +384,33 @@ impl<'a> Test<'a> {
         Self { map, receiver, slack: receiver.half_texel + HALF_ULP }
     }
 
-    /// The middle of texel (i, j), (s, t).
+    /// Shadow coordinates of texel (i, j)'s centre.
     fn center(&self, i: i32, j: i32) -> DVec2 {
         shadow_coordinates(self.map, DVec2::new(f64::from(i), f64::from(j)) + 0.5)
     }
 
-    /// The depth from which on texel (i, j) does not hide the receiver.
+    /// The smallest depth with which texel (i, j) does not hide the receiver.
     fn nearest_lit(&self, i: i32, j: i32) -> f64 {
         let center = self.center(i, j);
         let depth = self.receiver.depth;
-        // An edge-on receiver's infinite slope makes the rise infinite or NaN. `min` ignores NaN.
+        // Where the receiver is edge-on to the light its slope is infinite, and the rise is
+        // infinite or NaN. `min` ignores NaN.
         let rise = self.receiver.slope.dot(center - self.receiver.st);
-        // Depths end at 1: what is stored as 1 may lie anywhere behind.
+        // Depths end at 1: a surface stored as 1 may lie anywhere behind.
         let expected = depth.min(depth + rise).min(1.0);
         let limit = expected - self.slack;
-        // What is stored as 0 is a caster that was clamped, however much is allowed for; unless the surface
-        // itself would be.
+        // Depth 0 is that of a clamped caster, which hides the receiver however large the slack is,
+        // unless the receiver's own plane lies in front of depth 0.
         if expected > 2.0 * HALF_ULP { limit.max(HALF_ULP) } else { limit }
     }
 }
 
-/// One side of a box filter: the texels it covers, the first and the last in part.
+/// One axis of a box filter: the range of texels it covers, the first and the last in part.
 struct Span {
     first: i32,
     n: u32,
-    /// How much of the first texel is left out, and of the last one covered, in [0, 1).
+    /// The share of the first texel that is not covered, which is the share of the last one that
+    /// is, in [0, 1).
     fraction: f64,
 }
 
@@ -392,7 +421,8 @@ impl Span {
         Self { first: first as i32, n, fraction: start - first }
     }
 
-    /// Sum of `value` over the texels, weighted by how much of each is covered; in all n.
+    /// Sum of `value` over the texels, weighted by the covered share of each. The weights add up to
+    /// n.
     fn sum(&self, value: impl Fn(i32) -> f64) -> f64 {
         let last = self.first + self.n as i32;
         let inner: f64 = (self.first + 1..last).map(&value).sum();

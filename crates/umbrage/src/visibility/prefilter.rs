@@ -4,40 +4,45 @@ use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap, Slab};
 use glam::DVec2;
 
-/// Numbers in place of depths, filtered by a Gaussian.
+/// A filter that is applied ahead of lookup: a Gaussian over statistics of depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prefilter {
-    /// Which numbers.
+    /// Which statistic of depth is stored.
     pub statistic: Statistic,
-    /// How wide the Gaussian is.
+    /// The width of the Gaussian.
     pub blur: Blur,
-    /// Stored at half the resolution of the map, each number the mean over four of the map's texels: a quarter of the memory and of the blur's work.
+    /// Whether the prefiltered map has half the resolution of the map, each texel the mean of four
+    /// of the map's texels. This takes a quarter of the memory and a quarter of the blur's work.
     pub half: bool,
 }
 
-/// How wide a Gaussian is: its standard deviation is a quarter of that.
+/// Width of a Gaussian, which is four times its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Blur {
-    /// So many of the texels that are stored, wherever: blurred ahead of lookup. An odd number, 1 ..= [`Prefilter::MAX_BLUR`]; 1 is no blur.
+    /// An odd number of the prefiltered map's texels, 1 ..= [`Prefilter::MAX_BLUR`], all over the
+    /// map. The blur is done ahead of lookup; 1 is no blur.
     Texels(u32),
-    /// A width that knows the warp: looked up in smaller and smaller copies of the map, at several places along and across it.
+    /// A width that does not depend on warp or resolution. Lookup takes samples of the prefiltered
+    /// map's mip levels at several places along and across the filter's footprint.
     Width(Width),
 }
 
-/// Where a filter samples: at `samples[0]` by `samples[1]` places around a point.
+/// The samples that lookup takes around a receiver: a grid of `samples[0]` × `samples[1]` places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Level of detail: texels there are two to the power of this wide.
+    /// Mip level of the samples. A texel of level l is 2^l texels of the map wide.
     pub level: u32,
-    /// Places along the footprint and across it, ≥ 1.
+    /// Number of places along and across the footprint, each ≥ 1.
     pub samples: [u32; 2],
-    /// From place to place along and across, texels.
+    /// Steps from place to place along and across the footprint, in texels of the map.
     pub steps: [DVec2; 2],
-    /// What is averaged over, texels²: variances in s and t, and covariance.
+    /// Variance in s, variance in t and covariance of the region that the samples average over,
+    /// texels².
     pub covariance: [f64; 3],
 }
 
-/// `n` places along one axis of a Gaussian, from end to end of ±2 deviations: how many steps from the middle, and how heavy.
+/// `n` places along one axis of a Gaussian, at equal steps over ±2 standard deviations: the number
+/// of steps from the middle and the weight of each.
 fn places(n: u32) -> impl Iterator<Item = (f64, f64)> + Clone {
     let (middle, deviation) = (0.5 * (f64::from(n) - 1.0), f64::from(n) / 4.0);
     (0..n).map(move |i| {
@@ -46,35 +51,43 @@ fn places(n: u32) -> impl Iterator<Item = (f64, f64)> + Clone {
     })
 }
 
-/// How many places an axis of variance `rest` (beyond that of a sample) takes, and how far apart they are, both in units of the level's texels.
+/// The number of places along an axis and the step between them, in texels of the mip level. `rest`
+/// is the variance to be reached beyond that of one sample, in squares of that texel.
 fn spread(rest: f64) -> (u32, f64) {
     if rest <= 1e-6 {
         return (1, 0.0);
     }
     let n = ((1.5 * rest.sqrt()).ceil() as u32).clamp(2, Footprint::MAX_SAMPLES);
-    // Places that are cut off at two deviations have less variance than what they stand for; two have the same.
+    // The weights are cut off at two standard deviations, which reduces the variance of three or
+    // more places but not of two.
     let kept = if n == 2 { 1.0 } else { Footprint::KEPT_VARIANCE };
     (n, (rest / kept).sqrt() * 4.0 / f64::from(n))
 }
 
 impl Footprint {
-    /// Variance of what one sample averages over, in squares of the level's texel: the box that made it, and the interpolation between texels.
+    /// Variance of the region that one sample averages over, in squares of the mip level's texel:
+    /// that of the texel's own box and of the interpolation between texels.
     pub const SAMPLE_VARIANCE: f64 = 0.25;
 
-    /// The least variance across a filter, in the same unit, for which a level is taken. With one sample only what is averaged over depends on where
-    /// between texels it falls; with two it hardly does.
+    /// Least variance of the filter across its footprint, in squares of a mip level's texel, for
+    /// which that level is used. On a coarser level one sample would do, but the region it averages
+    /// over depends on where between the texels it falls; the region of two samples hardly does.
     pub const LEAST_VARIANCE: f64 = 0.5;
 
-    /// How many times longer than across a filter may be; what is longer still gets wider, as with a texture unit's anisotropy of 16.
+    /// The largest ratio of a footprint's length to its width, like a texture unit's anisotropy of
+    /// 16. Longer footprints are widened.
     pub const ANISOTROPY: f64 = 16.0;
 
-    /// The variance of three or more places along an axis, as a share of that of the Gaussian whose ends are cut off: 0.77 to 0.80.
+    /// Variance of three or more places along an axis as a share of the full Gaussian's. Because
+    /// its ends are cut off, the share is 0.77 to 0.80.
     pub const KEPT_VARIANCE: f64 = 0.78;
 
-    /// Samples along one side at most, for those that are wider than the coarsest level is meant for.
+    /// The most samples along one axis, which only filters wider than the coarsest level is meant
+    /// for reach.
     pub const MAX_SAMPLES: u32 = 36;
 
-    /// The mean over the places around `texel`, none nearer to the ends of what is drawn than half a texel of the level.
+    /// The weighted mean of the samples around `texel`. Samples keep half a texel of the mip level
+    /// from the ends of what is drawn.
     pub(super) fn gather(
         &self,
         texel: DVec2,
@@ -100,19 +113,20 @@ impl Footprint {
 }
 
 impl Prefilter {
-    /// A Gaussian's standard deviation as a share of its width.
+    /// Standard deviation of the Gaussian as a share of its width.
     pub const DEVIATION: f64 = 0.25;
 
-    /// The widest blur, texels.
+    /// The widest blur in texels.
     pub const MAX_BLUR: u32 = 63;
 
-    /// Copies of a map, each of half the resolution of the one before, that [`Blur::Width`] samples.
+    /// Number of mip levels of a prefiltered map whose blur is a [`Blur::Width`], each of half the
+    /// resolution of the one before.
     pub const LEVELS: u32 = 6;
 
-    /// That the parameters make sense.
+    /// Checks that all parameters are in their ranges.
     ///
     /// # Errors
-    /// Names the one that does not.
+    /// Names the parameter that is out of its range.
     pub fn check(&self) -> Result<(), Error> {
         self.statistic.check()?;
         match self.blur {
@@ -125,7 +139,7 @@ impl Prefilter {
         }
     }
 
-    /// How many levels there are.
+    /// Number of the prefiltered map's mip levels.
     pub fn levels(&self) -> u32 {
         match self.blur {
             Blur::Texels(_) => 1,
@@ -133,7 +147,7 @@ impl Prefilter {
         }
     }
 
-    /// How many of the texels that are stored to each side the blur ahead of lookup reaches.
+    /// Reach of the blur ahead of lookup to each side, in texels of the prefiltered map.
     pub fn radius_texels(&self) -> u32 {
         match self.blur {
             Blur::Texels(n) => n.min(Self::MAX_BLUR) / 2,
@@ -141,7 +155,7 @@ impl Prefilter {
         }
     }
 
-    /// Level of detail of what is stored: 1 if at half the resolution.
+    /// Mip level of the prefiltered map itself: 1 if it has half the map's resolution, otherwise 0.
     pub fn first_level(&self) -> u32 {
         u32::from(self.half)
     }
@@ -150,8 +164,8 @@ impl Prefilter {
         1 << (self.levels() - 1 + self.first_level())
     }
 
-    /// How many texels beyond the map's border lookups of points in the map can reach: the blur's radius, and one more to interpolate; or
-    /// the largest texel there is.
+    /// How many texels beyond the map's border lookups of receivers within the map can read: the
+    /// blur's radius and one more for interpolation, or one texel of the coarsest mip level.
     pub(super) fn reach_texels(&self) -> u32 {
         match self.blur {
             Blur::Texels(_) => (self.radius_texels() + 1) << self.first_level(),
@@ -159,8 +173,8 @@ impl Prefilter {
         }
     }
 
-    /// Weights of the texels at distances 0 ..= [`radius_texels`](Self::radius_texels) to one side; with those to the other side they add up
-    /// to 1.
+    /// Weights of the texels at distances 0 ..= [`radius_texels`](Self::radius_texels). Together
+    /// with those of the other side they add up to 1.
     pub fn weights(&self) -> impl Iterator<Item = f32> + Clone + use<> {
         let radius = self.radius_texels();
         let deviation = Self::DEVIATION * f64::from(2 * radius + 1);
@@ -169,19 +183,21 @@ impl Prefilter {
         (0..=radius).map(move |k| (gaussian(k) / sum) as f32)
     }
 
-    /// Variance of all that lookup in a map that was blurred averages over, in one direction, texels²: the blur and the interpolation
-    /// between texels.
+    /// Variance along one axis of the region that a lookup in a blurred map averages over,
+    /// texels². It includes the blur and the interpolation between texels.
     pub fn variance_texels(&self) -> f64 {
         let blur: f64 = self
             .weights()
             .zip(0u32..)
             .map(|(w, k)| 2.0 * f64::from(w) * f64::from(k).powi(2))
             .sum();
-        // Of the linear weights between texels, in the mean over all places, and of the four texels that one stands for.
+        // 1/6 is the variance of linear interpolation, averaged over all positions between two
+        // texels; 0.25 is that of the two texels of a side that one texel of half resolution stands
+        // for.
         if self.half { 4.0 * (blur + 1.0 / 6.0) + 0.25 } else { blur + 1.0 / 6.0 }
     }
 
-    /// Where to sample for a receiver.
+    /// The samples to take for a receiver.
     pub fn footprint(&self, receiver: &Receiver) -> Footprint {
         let Blur::Width(width) = self.blur else {
             let variance = self.variance_texels();
@@ -201,11 +217,12 @@ impl Prefilter {
         let minor = (mean - spread_of).max(major / (Footprint::ANISOTROPY * Footprint::ANISOTROPY));
         let level = 0.5 * (minor / Footprint::LEAST_VARIANCE).log2();
         let level = level.floor().clamp(f64::from(first), f64::from(last));
-        // Squares of the level's texels.
+        // Square of the width of the level's texel.
         let texel = (2.0 * level).exp2();
         let beyond = |variance: f64| spread(variance / texel - Footprint::SAMPLE_VARIANCE);
         let [(along, step), (across, step_across)] = [beyond(major), beyond(minor)];
-        // An eigenvector, by the row of the matrix that has more digits.
+        // Eigenvector of the covariance, from the row of the matrix that loses fewer digits to
+        // cancellation.
         let axis = if half_difference > 0.0 {
             DVec2::new(half_difference + spread_of, st)
         } else {
@@ -227,13 +244,14 @@ impl Prefilter {
         }
     }
 
-    /// The numbers of one texel of this depth, before they are stored.
+    /// The statistics of texel (i, j) of this depth, before they are rounded to be stored.
     pub fn encode(&self, map: &ShadowMap, i: i32, j: i32, depth: f32) -> Channels {
         let st = shadow_coordinates(map, DVec2::new(f64::from(i), f64::from(j)) + 0.5);
         self.statistic.encode(map.slab_depth(st, f64::from(depth)).clamp(0.0, 1.0) as f32)
     }
 
-    /// What a filtered map has at a point in texel coordinates, computed there and then from the depths around, and never stored.
+    /// The prefiltered map's statistics at a point in texel coordinates, computed from the
+    /// surrounding depths without rounding.
     pub(super) fn sample(
         &self,
         map: &ShadowMap,
@@ -249,7 +267,8 @@ impl Prefilter {
         let corner = texel / f64::from(size) - 0.5;
         let first = corner.floor();
         let fraction = corner - first;
-        // Weight of a texel along one axis: two Gaussians, as far as the point is from each.
+        // Weight of a texel along one axis: the blur's weights around the two texels between which
+        // the point lies, interpolated.
         let along = |k: i32, fraction: f64| {
             let at = |k: i32| {
                 let weight = weights.get(k.unsigned_abs() as usize).copied().unwrap_or(0.0);
@@ -273,7 +292,8 @@ impl Prefilter {
         sum.map(|s| s as f32)
     }
 
-    /// How much of the light reaches `receiver`, 0 to 1, by the mean over its footprint.
+    /// The share of the light that reaches `receiver`, 0 ..= 1, from the mean statistics over its
+    /// footprint.
     pub fn visibility(
         &self,
         map: &ShadowMap,
@@ -283,10 +303,11 @@ impl Prefilter {
     ) -> f32 {
         let [width, height] = map.resolution.map(f64::from);
         let expected = receiver.depth.min(1.0) - receiver.half_texel;
-        // Edge-on to the light the slope has no end: 8 in a texel is as good as infinite where all of depth is 1.
+        // Where the receiver is edge-on to the light its slope is infinite. Since all depths lie
+        // within 1, a slope of 8 per texel has the same effect.
         let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
         let steepest = 8.0 * texels;
-        // Over the slab's own planes.
+        // The receiver's slope counts relative to the slab's planes.
         let lean = match map.slab {
             Slab::Leaning { slope, .. } => slope,
             Slab::Distances { .. } => DVec2::ZERO,
@@ -296,7 +317,8 @@ impl Prefilter {
         let variance =
             ss * slope.x * slope.x + tt * slope.y * slope.y + 2.0 * st * slope.x * slope.y;
         let plane = f64::from(self.statistic.plane_deviations()) * variance.max(0.0).sqrt();
-        // What is stored lies between 0 and 1, and periods end there.
+        // Stored depths are clamped to 0 ..= 1, and the series of convolution shadow maps are valid
+        // there only.
         let depth = map.slab_depth(receiver.st, expected - plane).clamp(0.0, 1.0);
         self.statistic.visibility(channels, depth as f32)
     }

@@ -1,19 +1,21 @@
-//! Statistics of depth that can be filtered ahead of lookup: what they store, and what they make of it.
+//! Statistics of depth for prefilters: what each stores and how it reconstructs visibility.
 //!
-//! A comparison cannot be filtered before the receiver is known. So each of these stores, in place of depth, numbers whose *means* over many
-//! texels tell how much light a receiver at any depth gets. Depth is linear along the beam, 0 to 1 over the slab in which the map's receivers lie
-//! ([`ShadowMap::slab_depth`](crate::ShadowMap::slab_depth)).
+//! A comparison of depths cannot be filtered before the receiver is known. Each statistic therefore
+//! stores, in place of depth, functions of depth whose *means* over many texels determine how much
+//! light reaches a receiver at any depth. Depth is linear along the beam, from 0 to 1 over the slab
+//! that holds the map's receivers ([`ShadowMap::slab_depth`](crate::ShadowMap::slab_depth)).
 //!
-//! | | stores | tells |
+//! | | stores | reconstructs visibility by |
 //! | --- | --- | --- |
 //! | [`Vsm`] | z, z² | Chebyshev's bound |
-//! | [`Esm`] | exp(c z) | the exponential in place of the step |
-//! | [`Evsm`] | ± exp(± c z) and squares | Chebyshev's bound after a warp of depth |
-//! | [`Msm`] | four moments | Hamburger's bound |
-//! | [`Csm`] | sines and cosines of depth | the step's Fourier series |
+//! | [`Esm`] | exp(c z) | an exponential in place of the step function |
+//! | [`Evsm`] | ± exp(± c z) and their squares | Chebyshev's bound after a warp of depth |
+//! | [`Msm`] | z, z², z³, z⁴ | Hamburger's bound |
+//! | [`Csm`] | sines and cosines of depth | the Fourier series of the step function |
 //!
-//! To add one: a file beside this one, a file of the same name in `umbrage-wgpu/src/wgsl`, and a line in each place that has
-//! [`Statistic`]'s variants in a `match`, which the compiler names.
+//! A new statistic needs a file beside this one, a file of the same name in
+//! `umbrage-wgpu/src/wgsl/statistic`, and a line in each `match` over the variants of [`Statistic`], which
+//! the compiler reports.
 
 mod csm;
 mod esm;
@@ -30,13 +32,14 @@ pub use vsm::Vsm;
 use crate::error::Error;
 use std::fmt;
 
-/// The most numbers that a statistic has.
+/// The largest number of channels that a statistic has.
 pub const MAX_CHANNELS: usize = 32;
 
-/// A statistic's numbers; those beyond its own are 0.
+/// The values of a statistic, one for each channel; channels that the statistic does not have are
+/// 0.
 pub type Channels = [f32; MAX_CHANNELS];
 
-/// Which numbers are stored in place of depth.
+/// Which statistic of depth is stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Statistic {
     /// Variance shadow maps.
@@ -51,21 +54,21 @@ pub enum Statistic {
     Csm(Csm),
 }
 
-/// How a statistic's numbers are stored.
+/// The format in which a statistic's channels are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Storage {
-    /// Single precision.
+    /// Floating point in single precision.
     Float32,
-    /// 0 to 1 in 16 bits.
+    /// 16 bits for values from 0 to 1.
     Unorm16,
-    /// −1 to 1 in 16 bits.
+    /// 16 bits for values from −1 to 1.
     Snorm16,
-    /// −1 to 1 in 8 bits.
+    /// 8 bits for values from −1 to 1.
     Snorm8,
 }
 
 impl Storage {
-    /// Bytes of one number.
+    /// Bytes of one channel.
     pub fn bytes(self) -> u32 {
         match self {
             Self::Float32 => 4,
@@ -74,7 +77,7 @@ impl Storage {
         }
     }
 
-    /// What is left of a number that is stored.
+    /// The value after storing, clamped and rounded as the format requires.
     pub fn stored(self, value: f32) -> f32 {
         let steps = |low: f32, n: f32| (value.clamp(low, 1.0) * n).round() / n;
         match self {
@@ -86,29 +89,30 @@ impl Storage {
     }
 }
 
-/// What every statistic can do.
+/// The functions that each statistic implements.
 pub(crate) trait Encoding: fmt::Display {
-    /// How many numbers it has, 1 ..= [`MAX_CHANNELS`].
+    /// Number of channels, 1 ..= [`MAX_CHANNELS`].
     fn channels(&self) -> usize;
 
-    /// How they are stored.
+    /// The format in which the channels are stored.
     fn storage(&self) -> Storage {
         Storage::Float32
     }
 
-    /// The numbers of a texel of linear depth 0 ..= 1.
+    /// The channels of a texel of linear depth 0 ..= 1.
     fn encode(&self, depth: f32, channels: &mut Channels);
 
-    /// How much light reaches a receiver at a linear depth, from the means of the numbers around it: 0 ..= 1 before clamping.
+    /// The share of the light that reaches a receiver at a linear depth, from the channels' means
+    /// around it. It may lie outside 0 ..= 1, to which the caller clamps it.
     fn visibility(&self, channels: &Channels, depth: f32) -> f32;
 
-    /// How many standard deviations of the receiver's own plane over the filter to allow for. 0 for those that tell a
-    /// slanted plane from an occluder by themselves.
+    /// Allowance for the receiver's own plane, in standard deviations of its depth over the filter.
+    /// 0 for statistics that can distinguish a slanted plane from an occluder.
     fn plane_deviations(&self) -> f32 {
         0.0
     }
 
-    /// That its parameters make sense.
+    /// Checks that all parameters are in their ranges.
     fn check(&self) -> Result<(), Error>;
 }
 
@@ -123,53 +127,55 @@ impl Statistic {
         }
     }
 
-    /// How many numbers there are for each texel, 1 ..= [`MAX_CHANNELS`].
+    /// Number of channels of each texel, 1 ..= [`MAX_CHANNELS`].
     pub fn channels(&self) -> usize {
         self.encoding().channels()
     }
 
-    /// How they are stored.
+    /// The format in which the channels are stored.
     pub fn storage(&self) -> Storage {
         self.encoding().storage()
     }
 
-    /// The numbers of a texel of linear depth 0 ..= 1, before they are stored.
+    /// The channels of a texel of linear depth 0 ..= 1, before they are rounded to be stored.
     pub fn encode(&self, depth: f32) -> Channels {
         let mut channels = [0.0; MAX_CHANNELS];
         self.encoding().encode(depth, &mut channels);
         channels
     }
 
-    /// How much light reaches a receiver at a linear depth, 0 ..= 1, from the means of the numbers around it.
+    /// The share of the light that reaches a receiver at a linear depth, 0 ..= 1, from the
+    /// channels' means around it.
     pub fn visibility(&self, channels: &Channels, depth: f32) -> f32 {
         let visibility = self.encoding().visibility(channels, depth);
-        // What is no number, as of a receiver at no depth, is lit.
+        // The result is NaN where the receiver's depth is; such receivers are lit.
         if visibility.is_nan() { 1.0 } else { visibility.clamp(0.0, 1.0) }
     }
 
-    /// How many standard deviations of the receiver's own plane, over the filter, count as lit.
+    /// By how many standard deviations of the depth of its own plane over the filter the receiver
+    /// is moved towards the light before its visibility is reconstructed.
     pub fn plane_deviations(&self) -> f32 {
         self.encoding().plane_deviations()
     }
 
-    /// That its parameters make sense.
+    /// Checks that all parameters are in their ranges.
     ///
     /// # Errors
-    /// Names the parameter that does not.
+    /// Names the parameter that is out of its range.
     pub fn check(&self) -> Result<(), Error> {
         self.encoding().check()
     }
 }
 
-/// As in a shadow specification: `vsm`, `csm8`.
+/// The form of a technique's text: `vsm`, `csm8`.
 impl fmt::Display for Statistic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.encoding().fmt(f)
     }
 }
 
-/// Chebyshev's one-sided bound on the share of depths that are at least `depth`, from their mean and mean square (Donnelly and Lauritzen
-/// 2006, Eq. 5).
+/// Chebyshev's one-sided bound: the largest possible share of depths of at least `depth`, given
+/// their mean and mean square (Donnelly and Lauritzen 2006, Eq. 5).
 pub(crate) fn chebyshev([mean, square]: [f32; 2], least_variance: f32, depth: f32) -> f32 {
     if depth <= mean {
         return 1.0;
@@ -179,12 +185,13 @@ pub(crate) fn chebyshev([mean, square]: [f32; 2], least_variance: f32, depth: f3
     variance / (variance + beyond * beyond)
 }
 
-/// Takes what is below `leak` for shadow, and stretches the rest (Lauritzen 2008, GPU Gems 3, §8.4.3).
+/// Counts visibilities below `leak` as shadow and stretches the others to 0 ..= 1 (Lauritzen 2008,
+/// GPU Gems 3, §8.4.3).
 pub(crate) fn without_leak(visibility: f32, leak: f32) -> f32 {
     ((visibility - leak) / (1.0 - leak)).clamp(0.0, 1.0)
 }
 
-/// That a leak reduction is one.
+/// Checks that a threshold for light leaking is in its range.
 pub(crate) fn check_leak(leak: f32) -> Result<(), Error> {
     crate::error::check((0.0..1.0).contains(&leak), "filter.leak", || {
         format!("must be 0 to less than 1, is {leak}")

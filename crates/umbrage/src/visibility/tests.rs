@@ -3,7 +3,7 @@ use crate::plan::Rows;
 use proptest::prelude::*;
 use std::cell::RefCell;
 
-/// A map whose shadow space is world space.
+/// A map whose shadow space is local space.
 fn map(resolution: [u32; 2], rows: Rows) -> ShadowMap {
     ShadowMap { rows, resolution, ..ShadowMap::default() }
 }
@@ -12,7 +12,7 @@ fn flat(s: f64, t: f64, depth: f64) -> Receiver {
     Receiver { st: DVec2::new(s, t), depth, ..Receiver::default() }
 }
 
-/// Those that compare depths.
+/// Filters that compare depths.
 fn comparing() -> impl Iterator<Item = Filter> {
     let boxes = (1..=Filter::MAX_PCF).map(|n| Filter::pcf(n).unwrap());
     let widths = [Width::Metres(0.3), Width::Pixels(1e6)];
@@ -24,7 +24,7 @@ fn comparing() -> impl Iterator<Item = Filter> {
     std::iter::once(Filter::Hard).chain(boxes).chain(spread).chain(soft)
 }
 
-/// All kinds.
+/// Filters of every kind.
 fn filters() -> impl Iterator<Item = Filter> {
     use statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
     let statistics = [
@@ -60,7 +60,7 @@ fn the_nearest_texel_decides() {
     assert_eq!(at(0.76, 0.74, 0.5), 1.0);
     assert_eq!(at(0.51, 0.62, 0.5), 1.0);
     assert_eq!(at(0.51, 0.63, 0.25), 1.0, "what is stored does not hide itself");
-    // The far border belongs to the last texel.
+    // The map's far border belongs to its last texel.
     let last = |i, j| if (i, j) == (3, 7) { 0.25 } else { 1.0 };
     assert_eq!(visibility(&map, Filter::Hard, &flat(1.0, 1.0, 0.5), last), 0.0);
 }
@@ -68,7 +68,8 @@ fn the_nearest_texel_decides() {
 #[test]
 fn boxes_count_by_area() {
     let map = map([64, 64], Rows::Even);
-    // Dark left of texel column 30: the lit share of the box is linear in the point's place.
+    // Texel columns left of 30 are dark, so the lit share of the box is linear in the receiver's
+    // position.
     let depth = |i: i32, _| if i < 30 { 0.1 } else { 1.0 };
     for n in 1..=Filter::MAX_PCF {
         for step in 0..200 {
@@ -104,8 +105,8 @@ proptest! {
         s in 0.0..=1.0, t in 0.0..=1.0, elevation in 0.001f64..1.5, azimuth in 0.0..6.3,
         ratio in 1.001f64..1e4,
     ) {
-        // Stored as a map would: the plane's depth at each texel's centre, in single precision. Where a map
-        // serves a plane it leaves room before it.
+        // Texels store what a map would: the plane's depth at each texel's centre, in single
+        // precision. A map that serves a plane leaves a margin of depth in front of it.
         let slope = DVec2::from_angle(azimuth) / elevation.tan();
         for rows in [Rows::Even, Rows::Logarithmic { ratio }] {
             let map = map([37, 23], rows);
@@ -182,10 +183,11 @@ fn outside_the_map_or_its_depths_there_is_light() {
         assert_eq!(visibility(&empty, filter, &flat(0.5, 0.5, 0.5), all_dark), 1.0);
         let map = map([8, 8], Rows::Even);
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 0.5), all_dark), 0.0);
-        // A clamped caster hides what is allowed more than its depth.
+        // A clamped caster hides a receiver whose slack exceeds its depth.
         let coarse = Receiver { half_texel: 0.2, ..flat(0.5, 0.5, 0.1) };
         assert_eq!(visibility(&map, filter, &coarse, all_dark), 0.0);
-        // Nearer than what casts; and behind the map's far end where nothing was hit.
+        // Receivers before depth 0 are lit, and so are those behind the map's far end if no caster
+        // was drawn.
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, -0.1), all_dark), 1.0);
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 1.5), |_, _| 1.0), 1.0);
         assert_eq!(visibility(&map, filter, &flat(0.5, 0.5, 1.5), |_, _| 0.9), 0.0);
@@ -203,8 +205,9 @@ fn texel_coordinates_follow_the_rows() {
     }
 }
 
-/// Convolution maps of a slanted occluder, looked up in their smaller copies, along and across a footprint, let through what comparisons of all texels do, each with
-/// the weight that it has in the footprint, but for the terms that are left out.
+/// Lookup of convolution maps in mip levels agrees with comparisons of all texels, each with its
+/// weight in the footprint, but for the terms that the series leaves out. The occluder is slanted
+/// and the footprint longer along than across.
 #[test]
 fn smaller_copies_of_a_slanted_plane_are_comparisons_over_the_same_footprint() {
     use statistic::{Csm, MAX_CHANNELS, Statistic};
@@ -219,7 +222,7 @@ fn smaller_copies_of_a_slanted_plane_are_comparisons_over_the_same_footprint() {
         let blur = Blur::Width(Width::Metres(1.0));
         let prefilter = Prefilter { statistic, blur, half: false };
         let filter = Filter::Prefiltered(prefilter);
-        // Longer along t, and sheared.
+        // The footprint is longer along t, and sheared.
         let side = deviation_texels / Prefilter::DEVIATION;
         let texel_metric = [1.0, 6.0, shear].map(|m| m * side * side);
         let (mut worst, mut least, mut most) = (0.0f32, 1.0f32, 0.0f32);
@@ -229,7 +232,7 @@ fn smaller_copies_of_a_slanted_plane_are_comparisons_over_the_same_footprint() {
             let footprint = prefilter.footprint(&receiver);
             assert!(footprint.level > 1 && footprint.samples[0] > footprint.samples[1]);
             let is_lit = |i, j| f64::from(u8::from(f64::from(depth(i, j)) >= receiver.depth));
-            // Bilinearly between boxes of texels.
+            // The lit share, bilinearly interpolated between the boxes of a mip level's texels.
             let sample = |texel: DVec2, level: u32| {
                 let size = 1 << level;
                 let corner = texel / f64::from(size) - 0.5;
@@ -250,7 +253,8 @@ fn smaller_copies_of_a_slanted_plane_are_comparisons_over_the_same_footprint() {
             worst = worst.max((found - expected).abs());
             (least, most) = (least.min(found), most.max(found));
         }
-        // The less of the step the terms left out hold, the wider the footprint is in depth.
+        // The wider the footprint is in depth, the smaller is the part of the step that the missing
+        // terms make up.
         assert!(worst < allowed, "M = {order}, {deviation_texels} texels: {worst}");
         assert!(least < 0.1 && most > 0.9, "nothing passes from light to dark");
     }

@@ -2,12 +2,13 @@ use crate::error::{Error, check};
 use crate::plan::Receiver;
 use std::fmt;
 
-/// How wide a filter is, whatever the warp and the resolution: as wide near as far, and in every partition.
+/// Width of a filter that does not depend on warp or resolution, so that it is the same near and
+/// far and under every partition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Width {
-    /// So many pixels of the picture, whichever way the surface lies in it: for smooth edges.
+    /// Width in pixels of the image, at any orientation of the surface; gives smooth edges.
     Pixels(f32),
-    /// So many metres across the light: for soft shadows.
+    /// Width in metres across the light; gives soft shadows.
     Metres(f32),
 }
 
@@ -15,7 +16,8 @@ impl Width {
     /// The largest width, pixels or metres.
     pub const MAX: f32 = 1e6;
 
-    /// Squares of the texels that a line of this width covers in s and in t, and the product of the two, as in [`Receiver::texel_metric`].
+    /// [`Receiver::texel_metric`] or [`Receiver::pixel_metric`] times the square of this width:
+    /// squared extents of the width in s and t, and their product, texels².
     pub(crate) fn metric(self, receiver: &Receiver) -> [f64; 3] {
         let (width, metric) = match self {
             Self::Pixels(pixels) => (f64::from(pixels), receiver.pixel_metric),
@@ -32,7 +34,7 @@ impl Width {
     }
 }
 
-/// As in a technique's text: `1.5px`, `0.2m`.
+/// The form of a technique's text: `1.5px`, `0.2m`.
 impl fmt::Display for Width {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -42,17 +44,18 @@ impl fmt::Display for Width {
     }
 }
 
-/// How large a light is, which decides how wide penumbrae are.
+/// Size of a light, which determines the width of penumbrae.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightSize {
-    /// The angle that a directional light takes up in the sky, degrees, at most
-    /// [`MAX_DEGREES`](Self::MAX_DEGREES). Our sun has 0.53.
+    /// The angle that a directional light subtends, degrees, > 0 and at most
+    /// [`MAX_DEGREES`](Self::MAX_DEGREES). The sun subtends 0.53 degrees.
     Degrees(f32),
-    /// The diameter of a spot or point light, metres, at most [`MAX_METRES`](Self::MAX_METRES).
+    /// The diameter of a spot or point light, metres, > 0 and at most
+    /// [`MAX_METRES`](Self::MAX_METRES).
     Metres(f32),
 }
 
-/// Our sun's.
+/// The size of our sun.
 impl Default for LightSize {
     fn default() -> Self {
         Self::Degrees(0.53)
@@ -60,14 +63,14 @@ impl Default for LightSize {
 }
 
 impl LightSize {
-    /// The widest sun, degrees.
+    /// The largest angle of a directional light, degrees.
     pub const MAX_DEGREES: f32 = 90.0;
 
-    /// The largest lamp, metres.
+    /// The largest diameter of a lamp, metres.
     pub const MAX_METRES: f32 = 1e6;
 
-    /// The light's diameter: of a lamp in metres, of a sun in metres per metre of distance (twice the
-    /// tangent of half its angle).
+    /// The light's diameter: for a lamp in metres; for a sun in metres per metre of distance, twice
+    /// the tangent of half its angle.
     pub fn diameter(self) -> f32 {
         match self {
             Self::Degrees(angle) => 2.0 * (0.5 * angle).to_radians().tan(),
@@ -86,7 +89,7 @@ impl LightSize {
     }
 }
 
-/// As in a technique's text: `0.53deg`, `0.2m`.
+/// The form of a technique's text: `0.53deg`, `0.2m`.
 impl fmt::Display for LightSize {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,4 +1,5 @@
-//! Warps: homographies of the light plane (x, z of light space) that spread texels over it.
+//! Warps: homographies of the light plane (x, z of light space), which determine how texels are
+//! spread over it.
 
 mod adaptive;
 mod light_space;
@@ -13,10 +14,10 @@ use crate::math::range;
 use crate::technique::Warp;
 use glam::{DMat3, DVec2, DVec3};
 
-/// Strengths beyond this have no digits left.
+/// The largest strength of a warp; stronger ones would lose all digits.
 const MAX_STRENGTH: f64 = 1e9;
 
-/// A vertex of the body seen, as the light sees it.
+/// A point of the body, in light space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// Light-space x and z.
@@ -25,9 +26,9 @@ pub(crate) struct Seen {
     pub y: f64,
     /// Distance along the view, metres, > 0.
     pub depth: f64,
-    /// Metres perpendicular to the beam, per unit of light-space x, over `depth`.
+    /// Length perpendicular to the beam of a unit of light-space x, metres, over `depth`.
     pub base: f64,
-    /// The same for the height over that base, per unit of light-space z.
+    /// The same for a unit of light-space z, measured perpendicular to that length.
     pub height: f64,
 }
 
@@ -51,8 +52,9 @@ impl Seen {
     }
 }
 
-/// A family of one-point perspectives along z: x is divided by w(z) = 1 + ν (z − z₀)/μ, which grows
-/// from 1 at the near plane to 1 + ν at the far plane. ν = μ/λ is the warp's strength; 0 is no warp.
+/// A family of one-point perspectives along z, which divide x by w(z) = 1 + ν (z − z₀)/μ. w
+/// grows from 1 at the near plane to 1 + ν at the far plane. ν = μ/λ is the warp's strength; ν
+/// = 0 is no warp.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnePoint {
     /// Light-space x of the centre of projection.
@@ -61,26 +63,26 @@ pub(crate) struct OnePoint {
     z0: f64,
     /// Depth range μ, light-space units, > 0.
     mu: f64,
-    /// View distance of the nearest and the farthest point seen, metres.
+    /// View distances of the nearest and the farthest point seen, metres.
     nearest: f64,
     farthest: f64,
 }
 
 impl OnePoint {
-    /// The family that fits the points seen.
+    /// The family whose near and far plane enclose the points seen.
     pub(crate) fn around(seen: &[Seen], space: &LightSpace) -> Self {
         let (x0, x1) = range(seen.iter().map(|p| p.xz.x));
         let (z0, z1) = range(seen.iter().map(|p| p.xz.y));
         let (nearest, farthest) = range(seen.iter().map(|p| p.depth));
-        // The viewer is local space's origin. After a spot light's perspective he may lie at or
-        // beyond infinity, so there the middle of what he sees stands in for him.
+        // The viewer is local space's origin. After a spot light's perspective the viewer's image
+        // may lie at or beyond infinity; the middle of the points seen replaces it there.
         let center_x = if space.apex.is_some() { x0.midpoint(x1) } else { 0.0 };
         // A body that is flat and parallel to the light has no depth range.
         let mu = (z1 - z0).max(1e-9 * (x1 - x0)).max(f64::MIN_POSITIVE.sqrt());
         Self { center_x, z0, mu, nearest, farthest }
     }
 
-    /// w relative to the near plane's.
+    /// w at light-space z; it is 1 at the near plane.
     fn w(&self, nu: f64, z: f64) -> f64 {
         1.0 + nu / self.mu * (z - self.z0)
     }
@@ -90,7 +92,7 @@ impl OnePoint {
         range(seen.iter().map(|p| (p.xz.x - self.center_x) / self.w(nu, p.xz.y)))
     }
 
-    /// The homography of strength ν, fitted to the points seen.
+    /// The homography of strength ν, scaled so that the points seen fill [0, 1]².
     pub(crate) fn homography(&self, nu: f64, seen: &[Seen]) -> DMat3 {
         let (lo, hi) = self.extent(nu, seen);
         let width = (hi - lo).max(1e-9 * self.mu);
@@ -114,9 +116,10 @@ impl OnePoint {
             Warp::Uniform | Warp::Psm => 0.0,
             Warp::Lambda(lambda) => self.mu / lambda,
             Warp::Adaptive(objective) => {
-                // As the view turns into the light z swings around, and what is best for one z is
-                // not for its opposite. The cost has one valley, so that less warp than the best is
-                // still better than none.
+                // As the view direction passes the light direction, z turns to its opposite, and
+                // the best strength for one z is not the best for the other. So the strength fades
+                // out before. As the cost has a single minimum, less than the best strength is
+                // still better than no warp.
                 let phi = camera.tan_half_fov_y().atan();
                 let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
                 least_error(self, seen, objective) * fade
@@ -133,10 +136,10 @@ impl OnePoint {
                 if !is_before_light || delta >= 0.8 * self.mu {
                     return 0.0;
                 }
-                // t(δ) = 0.8 asks for λ = 0.2 μ δ/(0.8 μ − δ).
+                // t(δ) = 0.8 requires λ = 0.2 μ δ/(0.8 μ − δ).
                 let nu = (0.8 * self.mu - delta) / (0.2 * delta.max(0.0));
-                // The rule itself goes on warping as the view turns into the light, where z has no
-                // direction to follow. From θ = φ on it fades out.
+                // The published rule does not fade out as the view direction approaches the light
+                // direction, where z is undefined. Here the strength fades out for θ < φ.
                 let phi = camera.tan_half_fov_y().atan();
                 nu.min(view.strength(view.n)) * (view.sin_theta / phi.sin()).min(1.0)
             }),
@@ -144,14 +147,14 @@ impl OnePoint {
         strength.min(MAX_STRENGTH)
     }
 
-    /// A strength that follows from the view; none where the view runs along the light and z has no
-    /// direction to follow.
+    /// The strength that a rule gives from the view's distances; 0 if the view runs along the
+    /// light, where z is undefined.
     fn along_view(&self, space: &LightSpace, strength: impl FnOnce(AlongView) -> f64) -> f64 {
         let sin_theta = space.sin_theta;
         if sin_theta <= 1e-12 || space.z_per_view_metre <= 0.0 {
             return 0.0;
         }
-        // Metres of the light plane per unit of light-space z: 1 for directional lights.
+        // Metres of the light plane per unit of light-space z, which is 1 under parallel light.
         let metres = sin_theta / space.z_per_view_metre;
         strength(AlongView {
             sin_theta,
@@ -162,10 +165,10 @@ impl OnePoint {
     }
 }
 
-/// What the papers' rules for λ are made of.
+/// The quantities that the papers' rules for λ depend on.
 struct AlongView {
     sin_theta: f64,
-    /// View distance of the nearest and the farthest point seen, metres.
+    /// View distances of the nearest and the farthest point seen, metres.
     n: f64,
     f: f64,
     /// The warp's depth range μ, metres.

@@ -2,21 +2,22 @@ use super::LightSpace;
 use crate::camera::Camera;
 use glam::{DMat3, DVec3, DVec4, Vec4Swizzles};
 
-/// Perspective shadow maps (Stamminger and Drettakis 2002): the homography of the light plane by
-/// which a map sees the world from the light after the viewer's own perspective. Not yet fitted to
-/// [0, 1]². `None` where no perspective from the light can see all of `vertices` (local space).
+/// Perspective shadow maps (Stamminger and Drettakis 2002): the homography of the light plane that
+/// shows the world from the light after the viewer's perspective, before it is scaled to [0, 1]².
+/// `None` if no perspective from the light shows all of `vertices` (local space).
 ///
-/// After the viewer's perspective P the light is the point C = P·light: finite, inverted (C.w < 0) or
-/// still at infinity (C.w = 0). A picture taken from C is given by functionals that vanish at C,
-/// e·(C.w q.xyz − q.w C.xyz) up to scale, and these pass through all three cases without a seam.
-/// They do not vary along a beam, so on the light plane they are a homography.
+/// After the viewer's perspective P the light is the point C = P·light. It is finite, inverted
+/// (C.w < 0) or still at infinity (C.w = 0). The coordinates of a perspective image taken from C
+/// are functionals that vanish at C, e·(C.w q.xyz − q.w C.xyz) up to scale, which are continuous
+/// through all three cases. They do not vary along a beam, so they are a homography of the light
+/// plane.
 pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Option<DMat3> {
     let (n, f) = (camera.near(), camera.far());
     let forward = camera.forward();
     let slope_y = camera.tan_half_fov_y();
     let [width, height] = camera.image().map(f64::from);
     let slope_x = slope_y * width / height;
-    // q = (x, y, z, w) with x, y in about ±1, z in 0..1 and w the view depth.
+    // q = (x, y, z, w), where x and y range over about ±1, z over 0 to 1, and w is the view depth.
     let rows = [
         (camera.right() / slope_x).extend(0.0),
         (camera.up() / slope_y).extend(0.0),
@@ -31,20 +32,20 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
     let c = perspective(to_light);
     let c = c / c.length();
 
-    // From the light's image towards each vertex's.
+    // Vector from the light's image to the image of a vertex.
     let direction = |v: DVec3| {
         let q = perspective(v.extend(1.0));
         q.xyz() * c.w - c.xyz() * q.w
     };
     let axis = middle_of_cone(vertices, |v| direction(v).normalize())?;
-    // t follows the image's depth, as light space's z follows the view.
+    // t follows depth after the perspective, as light space's z follows the view.
     let up = (DVec3::Z - axis * axis.z)
         .try_normalize()
         .filter(|_| axis.cross(DVec3::Z).length() > 1e-9)
         .unwrap_or_else(|| (DVec3::Y - axis * axis.y).normalize());
     let across = up.cross(axis);
 
-    // A functional over the perspective space as a combination of light space's rows.
+    // A functional on the space after the perspective, as a combination of light space's rows.
     let on_light_plane = |covector: DVec4| {
         let local = rows[0] * covector.x
             + rows[1] * covector.y
@@ -57,8 +58,8 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
         };
         DVec3::new(x, z, w)
     };
-    // Divided by C.w, so that neither vanishes nor changes sides where the light is at infinity. There
-    // C lies on the axis, and e·C is 0.
+    // The functionals of s and t are divided by C.w, so that they neither vanish nor change sign as
+    // the light passes through infinity. At infinity C lies on the axis, and e·C is 0.
     let sideways = |e: DVec3| {
         let shift = if c.w == 0.0 { 0.0 } else { -e.dot(c.xyz()) / c.w };
         on_light_plane(e.extend(shift))
@@ -70,11 +71,12 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
     Some(DMat3::from_cols(s, t, w).transpose())
 }
 
-/// Axis of the narrowest cone around all directions, which are unit vectors. `None` if it is not narrower
-/// than a half-space.
+/// Axis of the narrowest cone around all directions, which are unit vectors. `None` if the cone is
+/// not narrower than a half-space.
 ///
-/// Grown one direction at a time, as Welzl (1991) grows smallest circles: one that sticks out lies
-/// on the border of the cone around it and those before, which one or two of these define with it.
+/// The cone is built one direction at a time, as Welzl (1991) builds smallest circles: a direction
+/// outside the current cone lies on the border of the cone around it and all directions before it,
+/// which is determined by it and one or two of these.
 fn middle_of_cone(vertices: &[DVec3], direction: impl Fn(DVec3) -> DVec3) -> Option<DVec3> {
     let sticks_out =
         |d: DVec3, axis: DVec3, on_border: DVec3| d.dot(axis) < on_border.dot(axis) - 1e-14;
@@ -124,7 +126,7 @@ mod tests {
             let axis = middle_of_cone(&directions, |d| d).unwrap();
             let found = narrowness(axis);
             for i in 0..4000 {
-                // A spiral over the sphere.
+                // The axes tried lie on a spiral over the sphere.
                 let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / 4000.0;
                 let (sin, cos) = (f64::from(i) * 2.399_963).sin_cos();
                 let r = (1.0 - y * y).sqrt();

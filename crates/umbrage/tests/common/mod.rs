@@ -1,4 +1,4 @@
-//! Random but valid views, lights and bounds, and brute-force geometry to check plans against.
+//! Random valid views, lights and bounds, and brute-force geometry to check plans against.
 #![allow(dead_code, reason = "each test file uses its own share of this module")]
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ use umbrage::{
     Planner, PointLight, Splits, SpotLight, Technique, Warp,
 };
 
-/// How a map's texels are spread, and over what.
+/// How a map's texels are spread, and what the map covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spread {
     pub warp: Warp,
@@ -102,7 +102,7 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
         })
 }
 
-/// Partitions of every kind, one in three none at all.
+/// Partitions of every kind; one in three is a single map.
 pub(crate) fn partition() -> impl Strategy<Value = Partition> {
     let splits = prop_oneof![
         3 => Just(Splits::SelfSimilar),
@@ -124,7 +124,7 @@ pub(crate) fn partition() -> impl Strategy<Value = Partition> {
     prop_oneof![1 => Just(Partition::default()), 2 => some]
 }
 
-/// `partition`, or as much of it as this cover can have.
+/// `partition`, restricted to what this cover allows.
 pub(crate) fn possible(partition: Partition, spread: Spread) -> Partition {
     if spread != STABLE {
         return partition;
@@ -134,7 +134,7 @@ pub(crate) fn possible(partition: Partition, spread: Spread) -> Partition {
     Partition { splits, faces: Faces::Whole, ..partition }
 }
 
-/// How many maps a light must have.
+/// The number of maps that a light must have.
 pub(crate) fn map_count(partition: &Partition, light: &Light) -> usize {
     let slices = partition.slices as usize;
     let maps = match partition.faces {
@@ -145,7 +145,7 @@ pub(crate) fn map_count(partition: &Partition, light: &Light) -> usize {
     if matches!(light, Light::Point(_)) { 6 * maps } else { maps }
 }
 
-/// A direction anywhere, or within a hair of the view or of its opposite.
+/// Any direction, or one very close to the view direction or its opposite.
 fn sun(camera: Camera) -> impl Strategy<Value = Light> {
     prop_oneof![
         4 => direction(),
@@ -157,7 +157,7 @@ fn sun(camera: Camera) -> impl Strategy<Value = Light> {
     .prop_map(|direction| Light::Directional { direction })
 }
 
-/// A spot light that shines at something amid the view.
+/// A spot light that shines at a point amid the view.
 fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
         move |([x, y, z], from, half, distance)| {
@@ -200,7 +200,7 @@ pub(crate) fn config() -> impl Strategy<Value = Config> {
             proptest::option::of((unit(), unit(), 0usize..4).prop_map(move |(a, b, flat)| {
                 let mut b = point_in_view(&camera, b);
                 let a = point_in_view(&camera, a);
-                // Some worlds are a floor, with no thickness at all.
+                // Some worlds are a flat floor.
                 if flat < 3 {
                     b[flat] = a[flat];
                 }
@@ -214,7 +214,8 @@ pub(crate) fn config() -> impl Strategy<Value = Config> {
     })
 }
 
-/// A point of the view frustum: x and y across the picture, z from near to far, denser nearby.
+/// A point of the view frustum: x and y across the image, z from near to far, denser near the
+/// viewer.
 pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
     let [w, h] = camera.image().map(f64::from);
     let depth = camera.near() * (camera.far() / camera.near()).powf(z);
@@ -222,8 +223,8 @@ pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
 }
 
 impl Config {
-    /// Half-spaces whose intersection is the body that the camera sees in the light, relative to the eye;
-    /// derived here anew, without the library's focus.
+    /// Half-spaces whose intersection is the body that the camera sees in the light, relative to
+    /// the eye; derived independently of the library's own code.
     pub(crate) fn half_spaces(&self) -> Vec<Plane> {
         let camera = &self.camera;
         let [w, h] = camera.image().map(f64::from);
@@ -253,7 +254,8 @@ impl Config {
         planes
     }
 
-    /// Corners of the body seen, relative to the eye: all intersections of three planes inside the others.
+    /// Corners of the body seen, relative to the eye: all intersections of three planes that lie
+    /// inside the others.
     pub(crate) fn corners(&self) -> Vec<DVec3> {
         let planes = self.half_spaces();
         let slack = 1e-9 * self.camera.far();
@@ -275,7 +277,7 @@ impl Config {
         corners
     }
 
-    /// Whether the camera sees `world` in the light, within the bounds.
+    /// Whether the camera sees `world` in the light and within the bounds.
     pub(crate) fn sees(&self, world: DVec3) -> bool {
         let local = world - self.camera.eye();
         let slack = 1e-12 * self.camera.far();

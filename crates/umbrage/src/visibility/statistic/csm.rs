@@ -4,11 +4,13 @@ use crate::theory::FourierStep;
 use std::f32::consts::PI;
 use std::fmt;
 
-/// Convolution shadow maps (Annen, Mertens, Bekaert, Seidel and Kautz 2007): M terms of the step's Fourier series, of which sin(c_k z) and cos(c_k z) are stored
-/// (their Eqs. 10 to 14, with the step the right way round; [`FourierStep`] has the series itself).
+/// Convolution shadow maps (Annen, Mertens, Bekaert, Seidel and Kautz 2007): M terms of the step
+/// function's Fourier series, of which sin(c_k z) and cos(c_k z) are stored (their Eqs. 10 to 14,
+/// where the step's direction is reversed as printed; [`FourierStep`] is the series itself).
 ///
-/// The series has a period: depths 2 apart are one. So depth is shrunk until the step, its offset and its ringing stay away from the next one, at any
-/// difference of depths that a map has.
+/// The series is periodic: it does not distinguish depths 2 apart. Depth is therefore multiplied by
+/// a factor below 1, so that even the largest difference of depths within a map keeps clear of the
+/// next period's step, its offset and its ringing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Csm {
     order: u32,
@@ -17,22 +19,25 @@ pub struct Csm {
     scale: bool,
     leak: f32,
     storage: Storage,
-    /// Follow from these: how much depth is shrunk, and the depth by which the series is evaluated nearer the light.
+    /// Values derived from the parameters: the factor of depth, and the offset of the series
+    /// towards the light.
     shrink: f32,
     shift: f32,
 }
 
-/// What is left of depth at least.
+/// The smallest factor of depth.
 const LEAST_SHRINK: f32 = 0.4;
 
 impl Csm {
-    /// The largest order: M sines and M cosines.
+    /// The largest order M; there are M sines and M cosines.
     pub const MAX_ORDER: u32 = 16;
 
-    /// M terms, 1 ..= [`MAX_ORDER`](Self::MAX_ORDER), damped against ringing by exp(−α (k/M)²) with α = `attenuation` ≥ 0 (0 for none).
+    /// A series of M = `order` terms, 1 ..= [`MAX_ORDER`](Self::MAX_ORDER). The terms are damped
+    /// against ringing by exp(−α (k/M)²) with α = `attenuation` ≥ 0 (0 for none).
     ///
-    /// `offset`: evaluate the series nearer the light by o_M, where it reaches 1 first, so that lit surfaces are bright. `scale`: double it instead. With
-    /// neither they are half as bright.
+    /// With `offset` the series is evaluated nearer the light by o_M, where it first reaches 1, so
+    /// that lit surfaces are bright. With `scale` it is doubled, to the same end. With neither, lit
+    /// surfaces are half as bright.
     ///
     /// # Errors
     /// Names the parameter that is out of its range.
@@ -50,60 +55,63 @@ impl Csm {
             scale,
             leak: 0.0,
             storage: Storage::Snorm8,
-            // Damped so much that it hardly is a step, the series would leave nothing.
+            // With extreme damping the offset approaches half a period, and 1 − 2 o would
+            // approach 0.
             shrink: (1.0 - 2.0 * o).max(LEAST_SHRINK),
             shift: if offset { o } else { 0.0 },
         })
     }
 
-    /// Stored in 16 bits in place of 8, for comparison.
+    /// The same series stored in 16 bits instead of 8, for comparison.
     #[must_use]
     pub fn in_16_bits(self) -> Self {
         Self { storage: Storage::Snorm16, ..self }
     }
 
-    /// What visibility is taken for shadow, 0 to less than 1: it hides the series' ringing.
+    /// The same series with visibilities up to `leak`, at least 0 and less than 1, counting as
+    /// shadow, which hides ringing.
     #[must_use]
     pub fn with_leak(self, leak: f32) -> Self {
         Self { leak, ..self }
     }
 
-    /// What visibility is taken for shadow.
+    /// The largest visibility that counts as shadow.
     pub fn leak(&self) -> f32 {
         self.leak
     }
 
-    /// How much the higher terms are damped: α.
+    /// Strength α of the damping of higher terms.
     pub fn attenuation(&self) -> f32 {
         self.attenuation
     }
 
-    /// Whether lit surfaces are made bright by an offset, and whether by doubling.
+    /// Whether lit surfaces are made bright by the offset, and whether by doubling.
     pub(crate) fn brightening(&self) -> [bool; 2] {
         [self.offset, self.scale]
     }
 
-    /// M.
+    /// The number of terms M.
     pub fn order(&self) -> u32 {
         self.order
     }
 
-    /// By how much depth is shrunk before it is encoded, 0 to 1.
+    /// The factor with which depth is multiplied before it is encoded, in (0, 1].
     pub fn shrink(&self) -> f32 {
         self.shrink
     }
 
-    /// How much nearer the light the series is evaluated, in shrunk depth.
+    /// How much nearer the light the series is evaluated, in depths after the multiplication.
     pub fn shift(&self) -> f32 {
         self.shift
     }
 
-    /// What the series is multiplied with.
+    /// The factor of the series: 2 if it is doubled, otherwise 1.
     pub fn gain(&self) -> f32 {
         if self.scale { 2.0 } else { 1.0 }
     }
 
-    /// Of each term: c_k times the shrinking of depth, and its amount 2/c_k, damped.
+    /// For each term k its frequency, c_k times the factor of depth, and its amplitude 2/c_k,
+    /// damped.
     pub fn terms(&self) -> impl Iterator<Item = [f32; 2]> + use<> {
         let Self { order, attenuation, shrink, .. } = *self;
         (1..=order).map(move |k| {

@@ -2,16 +2,18 @@ use super::{Channels, Encoding};
 use crate::error::{Error, check};
 use std::fmt;
 
-/// Exponential shadow maps (Annen, Mertens, Seidel, Flerackers and Kautz 2008): exp(c (z − d)) in place of the step, right where z < d, clamped to 1 where
-/// the mean of several depths lies behind the receiver.
+/// Exponential shadow maps (Annen, Mertens, Seidel, Flerackers and Kautz 2008): exp(c (z − d)) in
+/// place of the step function, for texel depth z and receiver depth d. This is accurate where z <
+/// d, and clamped to 1 where the mean lies behind the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Esm {
-    /// c, above 0 and at most [`MAX_EXPONENT`](Self::MAX_EXPONENT): how steep the step is.
+    /// The exponent c, > 0 and at most [`MAX_EXPONENT`](Self::MAX_EXPONENT); larger values give a
+    /// steeper step.
     pub exponent: f32,
 }
 
 impl Esm {
-    /// The largest c: exp(−c) must be a number of single precision.
+    /// The largest c for which exp(−c) does not underflow in single precision.
     pub const MAX_EXPONENT: f32 = 80.0;
 }
 

@@ -2,35 +2,36 @@ use super::{Channels, Encoding, chebyshev, check_leak, without_leak};
 use crate::error::{Error, check};
 use std::fmt;
 
-/// Exponential variance shadow maps (Lauritzen and McCool 2008): Chebyshev's bound on depth warped by exp(c z), and with four components also by
-/// −exp(−c z), of which the lower bound counts.
+/// Exponential variance shadow maps (Lauritzen and McCool 2008): Chebyshev's bound on depth warped
+/// by exp(c z). With four channels, depth is also warped by −exp(−c z), and the smaller of both
+/// bounds is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evsm {
-    /// Numbers stored, 2 or 4.
+    /// Number of channels, 2 or 4.
     pub components: u32,
-    /// c, above 0 and at most [`MAX_EXPONENT`](Self::MAX_EXPONENT).
+    /// The exponent c, > 0 and at most [`MAX_EXPONENT`](Self::MAX_EXPONENT).
     pub exponent: f32,
-    /// What visibility is taken for shadow, 0 to less than 1.
+    /// Visibilities up to this value, at least 0 and less than 1, count as shadow.
     pub leak: f32,
 }
 
 impl Evsm {
-    /// The largest c: squares of exp(c) must be numbers of single precision.
+    /// The largest c for which the square of exp(c) does not overflow in single precision.
     pub const MAX_EXPONENT: f32 = 42.0;
 }
 
 impl Default for Evsm {
-    /// Four components, c = 42.
+    /// Four channels, c = 42.
     fn default() -> Self {
         Self { components: 4, exponent: Self::MAX_EXPONENT, leak: 0.0 }
     }
 }
 
-/// The least deviation of depth that single precision can tell after the warp.
+/// Standard deviation of depth below which rounding to single precision dominates after the warp.
 const LEAST_DEVIATION: f32 = 1e-4;
 
 impl Evsm {
-    /// Upper bound from warped depths, `sign` being the exponent's.
+    /// Chebyshev's bound from the moments of depth warped with an exponent of this sign.
     fn bound(&self, moments: [f32; 2], sign: f32, depth: f32) -> f32 {
         let warped = sign * (sign * self.exponent * depth).exp();
         let deviation = LEAST_DEVIATION * self.exponent * warped;

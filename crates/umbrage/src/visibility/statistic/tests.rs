@@ -17,7 +17,7 @@ fn all() -> Vec<Statistic> {
     ]
 }
 
-/// The mean over depths, each stored as it would be.
+/// The mean channels of several depths, each rounded to the format it is stored in.
 fn mean(statistic: &Statistic, depths: &[f32]) -> Channels {
     let mut mean = [0f64; MAX_CHANNELS];
     for &depth in depths {
@@ -27,7 +27,7 @@ fn mean(statistic: &Statistic, depths: &[f32]) -> Channels {
     mean.map(|m| m as f32)
 }
 
-/// Numbers without a pattern.
+/// Pseudo-random numbers in 0 ..= 1.
 fn noise(i: u32) -> f32 {
     let x = (f64::from(i) * 12.9898).sin() * 43758.5453;
     (x - x.floor()) as f32
@@ -36,7 +36,7 @@ fn noise(i: u32) -> f32 {
 #[test]
 fn one_depth_is_a_step() {
     for statistic in all() {
-        // Low orders have a wide step.
+        // Series of low order have a wide step.
         let width = match statistic {
             Statistic::Csm(csm) => 0.5 / csm.shrink() / csm.order() as f32,
             _ => 0.1,
@@ -48,7 +48,8 @@ fn one_depth_is_a_step() {
                 let d = j as f32 / 40.0;
                 let lit = statistic.visibility(&channels, d);
                 assert!((0.0..=1.0).contains(&lit), "{statistic} {z} {d}: {lit}");
-                // A Fourier series rings by a tenth at most (Annen et al. 2007, Fig. 4), 8 bits by two steps in each term.
+                // A Fourier series rings by a tenth at most (Annen et al. 2007, Fig. 4); rounding
+                // to 8 bits adds two steps for each term.
                 if d <= z {
                     assert!(lit > 0.89, "{statistic}: {d} before {z}: {lit}");
                 } else if d > z + width {
@@ -68,14 +69,15 @@ fn means_of_two_depths_are_between() {
             let lit = statistic.visibility(&channels, 0.75);
             let expected = 1.0 - share as f32 / 8.0;
             match statistic {
-                // Bounds from above, tight where the receiver lies at one of the two depths.
+                // These are upper bounds, which are tight if the receiver lies at one of both
+                // depths.
                 Statistic::Vsm(_) | Statistic::Evsm(Evsm { components: 2, .. }) => {
                     assert!(lit >= expected - 1e-3, "{statistic} {share}: {lit}");
                 }
                 Statistic::Esm(_) => assert!(lit >= expected, "{statistic} {share}: {lit}"),
-                // One term is a ramp as long as all of depth.
+                // A series of one term is a ramp over all depths.
                 Statistic::Csm(csm) if csm.order() == 1 => {}
-                // Doubled, so that half shadow is full light.
+                // The series is doubled, so that half shadow is fully lit.
                 Statistic::Csm(csm) if csm.gain() == 2.0 => {
                     let doubled = (2.0 * expected).min(1.0);
                     assert!((lit - doubled).abs() < 0.2, "{statistic} {share}: {lit}");
@@ -88,13 +90,14 @@ fn means_of_two_depths_are_between() {
     }
 }
 
-/// Chebyshev's and Hamburger's bounds: no distribution of depths lets less light through than they say.
+/// Chebyshev's and Hamburger's bounds are upper bounds of the lit share for any distribution of
+/// depths.
 #[test]
 fn bounds_hold_for_any_depths() {
     for statistic in all() {
         let slack = match statistic {
             Statistic::Vsm(_) | Statistic::Evsm(_) => 1e-3,
-            // What its own bias and 16 bits cost.
+            // Moment shadow maps lose this much by their bias and by 16 bits.
             Statistic::Msm(_) => 0.03,
             _ => continue,
         };
@@ -103,7 +106,7 @@ fn bounds_hold_for_any_depths() {
             let depths: Vec<f32> = (0..count as u32)
                 .map(|k| {
                     let [a, b] = [noise(97 * i + k), noise(31 * i)];
-                    // Spread out, in clusters, or nearly alike.
+                    // Depths are spread out, clustered, or nearly equal.
                     match i % 3 {
                         0 => a,
                         1 => 0.5 * b + 0.5 * (3.0 * a).floor() / 3.0,
@@ -135,7 +138,7 @@ fn encodings_are_linear_in_the_filter() {
             let lit = |z: f32| statistic.encoding().visibility(&statistic.encode(z), d);
             parts.into_iter().zip(weights).map(|(z, w)| w * lit(z)).sum()
         };
-        // Only exponentials and series are linear in what is looked up, too.
+        // For exponentials and series alone, visibility is linear in the channels too.
         if matches!(statistic, Statistic::Esm(_) | Statistic::Csm(_)) {
             for d in [0.05, 0.3, 0.5, 0.95] {
                 let [whole, parts] = [statistic.encoding().visibility(&sum, d), each(d)];
@@ -148,7 +151,7 @@ fn encodings_are_linear_in_the_filter() {
     }
 }
 
-/// The stored sines and cosines sum up to the series itself, shrunk.
+/// The stored sines and cosines add up to the series itself, over depths multiplied by the factor.
 #[test]
 fn convolution_maps_are_the_fourier_step() {
     for (order, attenuation) in [(1, 0.0), (4, 0.0), (4, 1.5), (16, 0.0)] {
@@ -167,7 +170,7 @@ fn convolution_maps_are_the_fourier_step() {
     }
 }
 
-/// The series comes the nearer to the step the more terms it has, in the mean square over all pairs of depths.
+/// Each term reduces the mean square difference from the step over all pairs of depths.
 #[test]
 fn every_term_brings_the_step_nearer() {
     let mut last = f64::INFINITY;
@@ -189,11 +192,12 @@ fn every_term_brings_the_step_nearer() {
     }
 }
 
-/// Receiver and occluder as far apart as can be: no order, attenuation or offset sees the step's next period.
+/// With receiver and occluder as far apart as possible, the next period of the step has no effect
+/// for any order, attenuation or offset.
 #[test]
 fn the_period_does_not_show() {
     for order in 1..=Csm::MAX_ORDER {
-        // Strongly damped, low orders hardly are a step at all.
+        // Strongly damped series of low order hardly approximate a step.
         for attenuation in [0.0, 0.5, 2.0].into_iter().filter(|a| a * 4.0 <= order as f32) {
             for (offset, scale) in [(true, false), (false, true)] {
                 let csm = Csm::new(order, attenuation, offset, scale).unwrap();

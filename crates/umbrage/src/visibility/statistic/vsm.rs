@@ -2,14 +2,16 @@ use super::{Channels, Encoding, chebyshev, check_leak, without_leak};
 use crate::error::Error;
 use std::fmt;
 
-/// Variance shadow maps (Donnelly and Lauritzen 2006): mean and mean square of depth bound the lit share from above.
+/// Variance shadow maps (Donnelly and Lauritzen 2006): the mean and the mean square of depth bound
+/// the lit share from above.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vsm {
-    /// What visibility is taken for shadow, 0 to less than 1: it hides light that leaks, and darkens penumbrae.
+    /// Visibilities up to this value, at least 0 and less than 1, count as shadow. This hides light
+    /// leaking and darkens penumbrae.
     pub leak: f32,
 }
 
-/// Variance below which single precision says nothing of squares near 1.
+/// Variance below which rounding of squares near 1 to single precision dominates.
 const LEAST_VARIANCE: f32 = 2.5e-7;
 
 impl Encoding for Vsm {

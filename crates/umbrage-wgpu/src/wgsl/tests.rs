@@ -1,0 +1,366 @@
+use super::*;
+use crate::data;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use std::collections::BTreeSet;
+use std::fs;
+use std::mem::{offset_of, size_of};
+use std::path::Path;
+use umbrage::visibility::LightSize;
+use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Vsm};
+use wesl::syntax::TranslationUnit;
+use wesl::{CompileOptions, ManglerKind, ModulePath, Resolver, VirtualResolver, Wesl};
+
+fn validated(text: &str) -> (naga::Module, ModuleInfo) {
+    let module =
+        naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let info = validator.validate(&module);
+    let info = info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+    (module, info)
+}
+
+fn statistics() -> Vec<Statistic> {
+    let csm = |m| Statistic::Csm(Csm::new(m, 0.5, true, false).unwrap());
+    vec![
+        Statistic::Vsm(Vsm::default()),
+        Statistic::Esm(Esm::default()),
+        Statistic::Evsm(Evsm::default()),
+        Statistic::Evsm(Evsm { components: 2, ..Evsm::default() }),
+        Statistic::Msm(Msm::default()),
+        csm(1),
+        csm(3),
+        csm(16),
+    ]
+}
+
+const PASSES: [PrefilterPass; 4] =
+    [PrefilterPass::Encode, PrefilterPass::Rows, PrefilterPass::Columns, PrefilterPass::Halve];
+
+#[test]
+fn every_pass_of_a_prefilter_is_valid() {
+    for statistic in statistics() {
+        let blurs = [1, 3, 63].map(Blur::Texels);
+        for blur in blurs.into_iter().chain([Blur::Width(Width::Metres(1.0))]) {
+            for half in [false, true] {
+                let filter = Prefilter { statistic, blur, half };
+                let all = textures(&statistic);
+                for range in [0..all, 0..1, all - 1..all] {
+                    for pass in PASSES {
+                        validated(&prefilter(&filter, pass, range.clone()));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A user's shader: everything that may be called is, from a fragment shader.
+const USER: &str = "
+    @fragment
+    fn user(@location(0) position: vec3f, @location(1) normal: vec3f) -> @location(0) vec4f {
+        let place = shadow_place(1u, position);
+        let given = shadow_visibility(0u, position, normal);
+        return vec4f(given, shadow_visibility(1u, position, shadow_normal(position)), place.texel);
+    }";
+
+fn variants() -> impl Iterator<Item = (ShadowOptions, bool)> {
+    let prefiltered = statistics().into_iter().flat_map(|statistic| {
+        let blurs =
+            [Blur::Texels(7), Blur::Width(Width::Metres(0.5)), Blur::Width(Width::Pixels(3.0))];
+        blurs.into_iter().flat_map(move |blur| {
+            [false, true].map(|half| Filter::Prefiltered(Prefilter { statistic, blur, half }))
+        })
+    });
+    let widths = [Width::Metres(0.5), Width::Pixels(3.0)];
+    let spread = [Pattern::Grid, Pattern::Poisson]
+        .into_iter()
+        .flat_map(move |pattern| widths.map(|width| Filter::Spread { n: 5, width, pattern }));
+    let soft = [1, 8].map(|n| Filter::Pcss { n, light: LightSize::Metres(0.5) });
+    let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
+    let filters = filters.chain(prefiltered).chain(spread).chain(soft);
+    let with = |filter| {
+        let comparisons = [Comparison::PerTexel, Comparison::Hardware];
+        comparisons.into_iter().flat_map(move |comparison| {
+            [Layout::Atlas, Layout::Layers].map(|layout| ShadowOptions {
+                filter,
+                comparison,
+                layout,
+            })
+        })
+    };
+    filters.flat_map(with).flat_map(|options| [true, false].map(|storage| (options, storage)))
+}
+
+#[test]
+fn every_lookup_module_is_valid_in_front_of_a_users_shader() {
+    for (options, storage) in variants() {
+        for group in [0, 3] {
+            validated(&(lookup(group, &options, storage) + USER));
+        }
+    }
+}
+
+#[test]
+fn every_caster_module_is_valid() {
+    for depth_clip_control in [true, false] {
+        let support = Support { depth_clip_control, ..Support::FULL };
+        for is_masked in [true, false] {
+            validated(&mesh(&support, is_masked));
+        }
+        validated(&caster(3, &support));
+    }
+    validated(include_str!("clear.wesl"));
+}
+
+#[test]
+fn nothing_pollutes_a_users_names() {
+    for (options, storage) in variants() {
+        let (module, _) = validated(&lookup(1, &options, storage));
+        let functions = module.functions.iter().filter_map(|(_, f)| f.name.as_deref());
+        let globals = module.global_variables.iter().filter_map(|(_, g)| g.name.as_deref());
+        let constants = module.constants.iter().filter_map(|(_, c)| c.name.as_deref());
+        let types = module.types.iter().filter_map(|(_, t)| t.name.as_deref());
+        for name in functions.chain(globals).chain(constants).chain(types) {
+            assert!(name.to_lowercase().starts_with("shadow"), "{name}");
+        }
+    }
+}
+
+/// Offsets and size of a struct as naga lays it out.
+fn layout(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
+    let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
+    let (_, ty) = found.unwrap_or_else(|| panic!("no struct {name}"));
+    let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name}") };
+    let members = members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize));
+    (members.collect(), *span as usize)
+}
+
+macro_rules! check_layout {
+    ($module:expr, $name:literal, $type:ty, [$($field:ident),* $(,)?]) => {
+        let (members, span) = layout($module, $name);
+        let ours = vec![$((stringify!($field).to_owned(), offset_of!($type, $field))),*];
+        assert_eq!(members, ours, $name);
+        assert_eq!(span, size_of::<$type>(), $name);
+    };
+}
+
+#[test]
+fn structs_are_laid_out_alike() {
+    let (module, _) = validated(&(lookup(0, &ShadowOptions::default(), true) + USER));
+    let m = &module;
+    check_layout!(
+        m,
+        "ShadowSettings",
+        data::Settings,
+        [bias_texels, bias_metres, light_count, texture_scale, pixel_gradient, eye]
+    );
+    check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, padding]);
+    check_layout!(
+        m,
+        "ShadowMap",
+        data::Map,
+        [
+            s,
+            t,
+            depth,
+            w,
+            fade_from,
+            beam_scale,
+            slab,
+            size,
+            origin,
+            layer,
+            first_plane,
+            plane_count,
+            index
+        ]
+    );
+    let (module, _) = validated(&mesh(&Support::FULL, true));
+    check_layout!(&module, "ShadowCasterMap", data::CasterMap, [clip_from_render]);
+    let text = prefilter(
+        &Prefilter { statistic: statistics()[0], blur: Blur::Texels(3), half: false },
+        PrefilterPass::Rows,
+        0..1,
+    );
+    let (own, _) = validated(&text);
+    let (members, span) = layout(&own, "ShadowPrefilterMap");
+    let ours = [
+        offset_of!(data::PrefilterMap, beam_scale),
+        offset_of!(data::PrefilterMap, slab),
+        offset_of!(data::PrefilterMap, origin),
+        offset_of!(data::PrefilterMap, first_layer),
+    ];
+    assert_eq!(members.iter().map(|m| m.1).collect::<Vec<_>>(), ours);
+    assert_eq!(span, size_of::<data::PrefilterMap>());
+    check_layout!(&module, "ShadowMask", data::Mask, [factor, cutoff]);
+}
+
+#[test]
+fn uniform_arrays_fit_where_least_is_guaranteed() {
+    let least = wgpu::Limits::downlevel_webgl2_defaults().max_uniform_buffer_binding_size;
+    assert!((size_of::<data::Light>() * MAX_LIGHTS) as u64 <= least);
+    assert!((size_of::<data::Map>() * MAX_MAPS) as u64 <= least);
+    assert!((size_of::<[f32; 4]>() * MAX_PLANES) as u64 <= least);
+}
+
+#[test]
+fn arrays_of_uniform_buffers_are_as_long_as_is_checked() {
+    let options = ShadowOptions::default();
+    let (module, _) = validated(&lookup(0, &options, false));
+    let length = |name: &str| {
+        let found = module.global_variables.iter().find(|(_, g)| g.name.as_deref() == Some(name));
+        let naga::TypeInner::Array { size, .. } = module.types[found.unwrap().1.ty].inner else {
+            panic!("{name} is no array")
+        };
+        let naga::ArraySize::Constant(length) = size else { panic!("{name} has no length") };
+        length.get() as usize
+    };
+    let lengths = ["shadow_lights", "shadow_maps", "shadow_planes"].map(length);
+    assert_eq!(lengths, [MAX_LIGHTS, MAX_MAPS, MAX_PLANES]);
+}
+
+/// Of shaders with the same modules, the first.
+fn unlike(shaders: impl Iterator<Item = Shader>) -> Vec<Shader> {
+    let mut known = BTreeSet::new();
+    let is_new =
+        |shader: &Shader| known.insert(shader.modules().map(|(path, _)| path).collect::<Vec<_>>());
+    shaders.filter(is_new).collect()
+}
+
+/// A lookup of every kind, in bind group 2.
+fn lookups() -> Vec<Shader> {
+    unlike(variants().map(|(options, storage)| lookup_shader(2, &options, storage)))
+}
+
+/// A shader of every kind.
+fn shaders() -> Vec<Shader> {
+    let mut shaders = lookups();
+    for statistic in statistics() {
+        for half in [false, true] {
+            let filter = Prefilter { statistic, blur: Blur::Texels(5), half };
+            for pass in PASSES {
+                shaders.push(prefilter_shader(&filter, pass, 0..textures(&statistic)));
+            }
+        }
+    }
+    for depth_clip_control in [true, false] {
+        let support = Support { depth_clip_control, ..Support::FULL };
+        shaders.push(caster_shader(0, &support));
+        shaders.extend([true, false].map(|is_masked| mesh_shader(&support, is_masked)));
+    }
+    unlike(shaders.into_iter())
+}
+
+/// Paths of all modules of the package.
+fn package() -> Vec<String> {
+    fn visit(folder: &Path, prefix: &str, paths: &mut Vec<String>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let entry = entry.unwrap().path();
+            let name = entry.file_stem().unwrap().to_str().unwrap();
+            if entry.is_dir() {
+                visit(&entry, &format!("{prefix}{name}/"), paths);
+            } else if entry.extension().is_some_and(|e| e == "wesl") {
+                paths.push(format!("{prefix}{name}"));
+            }
+        }
+    }
+    let mut paths = Vec::new();
+    visit(&folder(), "", &mut paths);
+    paths
+}
+
+fn folder() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src/wgsl")
+}
+
+fn module_path(path: &str) -> ModulePath {
+    format!("package::{}", path.replace('/', "::")).parse().unwrap()
+}
+
+/// All that WESL's compiler links to a root: whole modules, without new names.
+fn wesl_linked(resolver: impl Resolver, root: &str) -> TranslationUnit {
+    let mut compiler = Wesl::new("").set_custom_resolver(resolver);
+    let options = CompileOptions { strip: false, lazy: false, ..CompileOptions::default() };
+    compiler.set_options(options).set_mangler(ManglerKind::None);
+    compiler.compile(&module_path(root)).unwrap_or_else(|e| panic!("{root}: {e}")).syntax
+}
+
+#[test]
+fn every_module_is_valid_by_itself() {
+    let package = package();
+    assert!(package.len() > 40, "{package:?}");
+    for path in package {
+        let linked = wesl_linked(wesl::FileResolver::new(folder()), &path);
+        validated(&linked.to_string());
+    }
+}
+
+#[test]
+fn shaders_are_linked_as_by_wesl() {
+    let package = package();
+    let declarations = |unit: &TranslationUnit| {
+        let mut all: Vec<_> = unit.global_declarations.iter().map(ToString::to_string).collect();
+        all.sort();
+        all
+    };
+    let mut used = BTreeSet::new();
+    for shader in shaders() {
+        let mut resolver = VirtualResolver::new();
+        for (path, text) in shader.modules() {
+            used.insert(path.to_owned());
+            // It stands for its alternatives too.
+            let folder = path.split_once('/').map(|(folder, _)| format!("{folder}/"));
+            let is_same = |other: &&String| match &folder {
+                Some(folder) => other.starts_with(folder),
+                None => *other == path,
+            };
+            for path in package.iter().filter(is_same) {
+                resolver.add_module(module_path(path), text.into());
+            }
+        }
+        let root = shader.modules().next().unwrap().0;
+        let expected = wesl_linked(resolver, root);
+        let linked: TranslationUnit = shader.link().parse().unwrap();
+        assert_eq!(declarations(&linked), declarations(&expected), "{root}");
+    }
+    // Drawn by another file.
+    used.insert("clear".to_owned());
+    assert_eq!(used, package.into_iter().collect());
+}
+
+/// What Rust writes has an example in the package.
+#[test]
+fn examples_are_what_is_generated() {
+    let file = |path| fs::read_to_string(folder().join(path).with_extension("wesl")).unwrap();
+    let examples = [
+        generated::samples(1),
+        generated::taps(Axis::Rows, &[0.5, 0.25]),
+        generated::encoded_outputs(0..1),
+        generated::blurred_outputs(0..1),
+    ];
+    for module in examples {
+        assert_eq!(file(module.path), module.text, "{}", module.path);
+    }
+    let names = |text: &str| -> BTreeSet<String> {
+        let names = text.lines().filter_map(|line| line.strip_prefix("const ")?.split_once(' '));
+        names.map(|(name, _)| name.to_owned()).collect()
+    };
+    let generated = shaders().iter().flat_map(|shader| names(&shader.constants)).collect();
+    assert_eq!(names(&file("constants")), generated);
+}
+
+#[test]
+fn users_may_import_the_lookup_in_wesl() {
+    let user = format!(
+        "import package::lights::shadows::{{shadow_normal, shadow_place, shadow_visibility}};
+        {USER}"
+    );
+    for lookup in lookups() {
+        let mut modules = VirtualResolver::new();
+        modules.add_module(module_path("lights/shadows"), lookup.link().into());
+        modules.add_module(module_path("user"), user.as_str().into());
+        let compiler = Wesl::new("").set_custom_resolver(modules);
+        let compiled = compiler.compile(&module_path("user")).unwrap_or_else(|e| panic!("{e}"));
+        validated(&compiled.to_string());
+    }
+}
