@@ -1,18 +1,19 @@
 //! `umbrage bench`: what each stage of a technique costs.
 
 use crate::args::bench;
-use crate::comparison::{light_info, view_info};
-use crate::execute::{Bencher, Costs, Execution, Sets};
 use crate::output::{aligned, print};
-use crate::pixels::{casters, milliseconds};
-use crate::progress::Progress;
-use crate::setup::{Receivers, lamp, onlooker, open_scene, tell_notices};
-use crate::spec::{Spec, planner};
+use crate::progress::Bar;
+use crate::setup::{announce, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
-use umbrage::Planner;
+use umbrage::{Bounds, Plan, Planner};
+use umbrage_lab::{
+    Bencher, Costs, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
+    choose_light, choose_view, milliseconds, planner,
+};
 use umbrage_measure::{LightInfo, View};
+use umbrage_scene::Scene;
 
 /// Frames that do not count: pipelines are compiled and buffers grow.
 const WARM_UP: u32 = 2;
@@ -95,7 +96,7 @@ impl Spread {
 
 /// A technique at work.
 struct Contender<'a> {
-    spec: &'a Spec,
+    technique: &'a NamedTechnique,
     bencher: Bencher<'a>,
     planner: Planner,
     frames: Vec<Frame>,
@@ -111,110 +112,140 @@ struct Frame {
 /// Measures, and prints a table or JSON.
 pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let scene = open_scene(&args.scene.name)?;
-    let onlooker = onlooker(&args.view, Some(&scene))?;
-    let camera = onlooker.camera;
-    let lamp = lamp(&args.light, Some(&scene))?;
-    let execution = Execution::open(&args.techniques.execution, &args.techniques.shadows)?;
-    let sets = Sets::new(&scene, &execution, args.scene.opaque)?;
-    let view = umbrage_trace::View::new(&sets.tracer, camera, lamp.light, 1)?;
-    let receivers = Receivers::new(&scene, &sets.tracer, args.techniques.fit);
+    let chosen_view = choose_view(&args.view.options(), Some(&scene))?;
+    let camera = chosen_view.camera;
+    let chosen_light = choose_light(&args.light.options(), Some(&scene))?;
+    let techniques = &args.techniques.shadows;
+    let executors = Executors::open(args.techniques.execution.backend.into(), techniques)?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.opaque)?;
+    let tracer = render_scene.tracer();
+    let view = umbrage_trace::View::new(tracer, camera, chosen_light.light, 1)?;
+    let receivers = Receivers::new(&scene, tracer, args.techniques.fit.into());
     let bounds = receivers.bounds();
     tell_notices(&scene);
-    execution.announce();
-    let frames = WARM_UP + args.frames;
-    let progress = Progress::new(u64::from(frames) * args.techniques.shadows.len() as u64, quiet);
+    announce(&executors);
     let mut contenders = Vec::new();
-    for spec in &args.techniques.shadows {
-        let bencher = sets.bencher(spec, camera.image())?;
-        contenders.push(Contender { spec, bencher, planner: planner(), frames: Vec::new() });
+    for technique in techniques {
+        let bencher = Bencher::new(&render_scene, technique.technique(), camera.image())?;
+        contenders.push(Contender { technique, bencher, planner: planner(), frames: Vec::new() });
     }
-    for index in 0..frames {
-        // Whoever comes first in a frame does not always do so.
-        let first = index as usize % contenders.len();
-        contenders.rotate_left(first);
-        for contender in &mut contenders {
-            let spec = contender.spec;
-            progress.stage(spec.to_string());
-            let start = Instant::now();
-            let plan = contender
-                .planner
-                .plan(&camera, &[lamp.light], &bounds, spec.technique())
-                .map_err(|e| spec.error(&e))?;
-            let planned = milliseconds(start);
-            let costs = contender.bencher.frame(&view, plan, args.still)?;
-            contender.frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
-            progress.advance(1);
-        }
-        contenders.rotate_right(first);
-    }
-    drop(progress);
-
-    let mut results = Vec::new();
-    for contender in &mut contenders {
-        let spec = contender.spec;
-        let plan = contender
-            .planner
-            .plan(&camera, &[lamp.light], &bounds, spec.technique())
-            .map_err(|e| spec.error(&e))?;
-        let first = contender.frames.first().context("frames")?;
-        let counted = &contender.frames[WARM_UP as usize..];
-        let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
-        let mut map_draws: Vec<DrawnJson> = plan
-            .maps
-            .iter()
-            .map(|m| DrawnJson { resolution: m.resolution, ..DrawnJson::default() })
-            .collect();
-        match &first.costs.drawn {
-            Some(drawn) => {
-                for (map, drawn) in drawn {
-                    map_draws[*map].draws = drawn.draws;
-                    map_draws[*map].triangles = drawn.triangles;
-                }
-            }
-            None => {
-                for (drawn, casters) in map_draws.iter_mut().zip(casters(plan, &scene)) {
-                    drawn.triangles = casters.drawn;
-                }
-            }
-        }
-        results.push(ResultJson {
-            shadows: spec.to_string(),
-            backend: contender.bencher.executor().name(),
-            device: execution.device().filter(|_| contender.bencher.executor().is_gpu()),
-            gpu_timestamps: contender.bencher.has_timestamps(),
-            maps: plan.maps.len(),
-            texels: plan.texels(),
-            bytes: first.costs.bytes,
-            storage_factor: plan.storage_factor(),
-            map_draws,
-            ms: TimesJson {
-                plan: spread(|f| f.plan),
-                depth: spread(|f| f.costs.depth),
-                filter: counted
-                    .iter()
-                    .map(|f| f.costs.filter)
-                    .collect::<Option<Vec<_>>>()
-                    .and_then(|values| Spread::of(values.into_iter())),
-                shade: spread(|f| f.costs.shade),
-                frame: spread(|f| f.frame),
-            },
-            first_ms: FirstJson { depth: first.costs.depth, frame: first.frame },
-        });
-    }
+    take_turns(&mut contenders, args, &view, &bounds, quiet)?;
+    let results = contenders.iter_mut().map(|contender| {
+        let device = executors.device().filter(|_| contender.bencher.executor().is_gpu());
+        contender.result(&scene, &view, &bounds, device)
+    });
     let bench = BenchJson {
         scene: scene.name.clone(),
         size: camera.image(),
-        view: view_info(&onlooker),
-        light: light_info(&lamp),
+        view: chosen_view.info(),
+        light: chosen_light.info(),
         frames: args.frames,
         still: args.still,
-        results,
+        results: results.collect::<Result<_>>()?,
     };
     if args.json {
         print(&format!("{}\n", serde_json::to_string_pretty(&bench)?))
     } else {
         print(&table(&bench))
     }
+}
+
+/// Draws all frames of all techniques.
+fn take_turns(
+    contenders: &mut [Contender<'_>],
+    args: &bench::Bench,
+    view: &umbrage_trace::View<'_>,
+    bounds: &Bounds<'_>,
+    quiet: bool,
+) -> Result<()> {
+    let frames = WARM_UP + args.frames;
+    let bar = Bar::new(u64::from(frames) * contenders.len() as u64, quiet);
+    for index in 0..frames {
+        // Whoever comes first in a frame does not always do so.
+        let first = index as usize % contenders.len();
+        contenders.rotate_left(first);
+        for contender in contenders.iter_mut() {
+            bar.stage(&contender.technique.to_string());
+            let start = Instant::now();
+            let Contender { technique, bencher, planner, frames } = contender;
+            let plan = made(planner, technique, view, bounds)?;
+            let planned = milliseconds(start);
+            let costs = bencher.frame(view, plan, args.still)?;
+            frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
+            bar.advance(1);
+        }
+        contenders.rotate_right(first);
+    }
+    Ok(())
+}
+
+impl Contender<'_> {
+    /// What the frames cost, over those that count.
+    fn result(
+        &mut self,
+        scene: &Scene,
+        view: &umbrage_trace::View<'_>,
+        bounds: &Bounds<'_>,
+        device: Option<String>,
+    ) -> Result<ResultJson> {
+        let Self { technique, bencher, planner, frames } = self;
+        let plan = made(planner, technique, view, bounds)?;
+        let first = frames.first().context("frames")?;
+        let counted = &frames[WARM_UP as usize..];
+        let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
+        let filter: Option<Vec<f64>> = counted.iter().map(|f| f.costs.filter).collect();
+        Ok(ResultJson {
+            shadows: technique.to_string(),
+            backend: bencher.executor().name(),
+            device,
+            gpu_timestamps: bencher.has_timestamps(),
+            maps: plan.maps.len(),
+            texels: plan.texels(),
+            bytes: first.costs.bytes,
+            storage_factor: plan.storage_factor(),
+            map_draws: map_draws(plan, &first.costs, scene),
+            ms: TimesJson {
+                plan: spread(|f| f.plan),
+                depth: spread(|f| f.costs.depth),
+                filter: filter.and_then(|values| Spread::of(values.into_iter())),
+                shade: spread(|f| f.costs.shade),
+                frame: spread(|f| f.frame),
+            },
+            first_ms: FirstJson { depth: first.costs.depth, frame: first.frame },
+        })
+    }
+}
+
+/// A technique's plan.
+fn made<'a>(
+    planner: &'a mut Planner,
+    technique: &NamedTechnique,
+    view: &umbrage_trace::View<'_>,
+    bounds: &Bounds<'_>,
+) -> Result<&'a Plan> {
+    let plan = planner.plan(view.camera(), &[*view.light()], bounds, technique.technique());
+    Ok(plan.map_err(|e| technique.blame(e))?)
+}
+
+/// What a frame draws into each map: by the GPU's own account, else what may cast into it.
+fn map_draws(plan: &Plan, first: &Costs, scene: &Scene) -> Vec<DrawnJson> {
+    let maps = plan.maps.iter();
+    let mut map_draws: Vec<DrawnJson> =
+        maps.map(|m| DrawnJson { resolution: m.resolution, ..DrawnJson::default() }).collect();
+    match &first.drawn {
+        Some(drawn) => {
+            for (map, drawn) in drawn {
+                map_draws[*map].draws = drawn.draws;
+                map_draws[*map].triangles = drawn.triangles;
+            }
+        }
+        None => {
+            for (drawn, casters) in map_draws.iter_mut().zip(casters(plan, scene)) {
+                drawn.triangles = casters.drawn;
+            }
+        }
+    }
+    map_draws
 }
 
 fn table(bench: &BenchJson) -> String {

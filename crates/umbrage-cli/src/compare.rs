@@ -1,45 +1,41 @@
 //! `umbrage compare`: techniques against ray-traced truth, as a report.
 
 use crate::args;
-use crate::comparison::{Comparison, Stage};
-use crate::execute::Execution;
-use crate::motion::Motion;
-use crate::output::{Contents, ReportFolder, aligned, command_line, note, print};
-use crate::pixels::NOTHING_TO_SHADOW;
-use crate::progress::Progress;
-use crate::setup::{open_scene, tell_notices};
+use crate::output::{aligned, command_line, note, print};
+use crate::progress::Bar;
+use crate::setup::{announce, open_scene, tell_notices};
 use anyhow::Result;
+use umbrage_lab::{
+    Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, ReportFolder,
+};
 use umbrage_measure::{Measured, Report};
 
 /// Compares, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
-    let folder = ReportFolder::check(&args.output, Contents::Comparison)?;
+    let folder = ReportFolder::check(&args.output, Contents::COMPARISON)?;
     let scene = open_scene(&args.scene.name)?;
-    let execution = Execution::open(
-        &args.comparison.techniques.execution,
-        &args.comparison.techniques.shadows,
-    )?;
-    let stage = Stage::new(&scene, &execution, args.scene.opaque, args.comparison.techniques.fit)?;
-    let comparison = Comparison::new(&stage, &args.view, &args.light, &args.comparison)?;
-    if let Some(motion) = args.motion {
+    let techniques = &args.comparison.techniques;
+    let executors = Executors::open(techniques.execution.backend.into(), &techniques.shadows)?;
+    let prepared =
+        PreparedScene::new(&scene, &executors, args.scene.opaque, techniques.fit.into())?;
+    let options = args.comparison.options();
+    let (view, light) = (args.view.options(), args.light.options());
+    let comparison = Comparison::new(&prepared, &view, &light, &options)?;
+    let motion = args.motion.map(Motion::from);
+    if let Some(motion) = motion {
         comparison.check_motion(motion, args.frames)?;
     }
     tell_notices(&scene);
-    execution.announce();
-    let rows_in_motion = u64::from(args.frames) * u64::from(args.view.size[1]);
-    let moving = match args.motion {
-        None => 0,
-        Some(Motion::Away) => 2 * rows_in_motion,
-        Some(_) => rows_in_motion,
-    };
-    let progress = Progress::new(comparison.rows() + moving, quiet);
-    let mut compared = comparison.trace(&progress)?;
-    if let Some(motion) = args.motion {
-        compared.move_on(motion, args.frames, &progress)?;
+    announce(&executors);
+    let moving = motion.map_or(0, |motion| comparison.rows_of_motion(motion, args.frames));
+    let bar = Bar::new(comparison.rows() + moving, quiet);
+    let mut compared = comparison.trace(&bar)?;
+    if let Some(motion) = motion {
+        compared.move_on(motion, args.frames, &bar)?;
     }
     let has_shadows = compared.has_shadows();
-    let report = folder.replace(|path| compared.write(path, &command_line(), &progress))?;
-    drop(progress);
+    let report = folder.replace(|path| compared.write(path, &command_line(), &bar))?;
+    drop(bar);
     if !has_shadows {
         log::warn!("{NOTHING_TO_SHADOW}");
     }

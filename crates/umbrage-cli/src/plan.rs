@@ -1,15 +1,17 @@
 //! `umbrage plan`: the matrices, resolutions and errors that an engine needs.
 
 use crate::args::{self, Fit};
-use crate::output::print;
-use crate::pixels::{Casters, casters, casters_culled};
-use crate::setup::{Lamp, Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
-use crate::spec::{Spec, planner};
+use crate::output::{print, six_digits};
+use crate::setup::{open_scene, tell_notices};
 use anyhow::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
 use umbrage::{
     Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, ShadowMap, Size, Slab, Warp,
+};
+use umbrage_lab::{
+    ChosenLight, ChosenView, MapCasters, NamedTechnique, Receivers, casters, casters_culled,
+    choose_light, choose_view, planner,
 };
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
@@ -85,7 +87,7 @@ struct MapJson {
     /// x, y, width and height in the atlas, texels; `null` without an atlas and for empty maps.
     rect: Option<[u32; 4]>,
     /// `null` without a scene.
-    casters: Option<Casters>,
+    casters: Option<MapCasters>,
 }
 
 /// Pixels per texel.
@@ -111,14 +113,14 @@ struct LayersJson {
 
 /// A plan, and what follows from it.
 struct Planned<'a> {
-    spec: &'a Spec,
-    onlooker: &'a Onlooker,
-    lamps: &'a [Lamp],
+    technique: &'a NamedTechnique,
+    view: &'a ChosenView,
+    chosen_lights: &'a [ChosenLight],
     plan: &'a Plan,
     atlas: Option<Atlas>,
     layers: Option<Atlas>,
     /// One for each map; without a scene, none.
-    casters: Option<Vec<Casters>>,
+    casters: Option<Vec<MapCasters>>,
     /// Their share that is culled, the mean over maps.
     culled: Option<f64>,
 }
@@ -126,30 +128,30 @@ struct Planned<'a> {
 /// Plans, and prints the plan.
 pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let scene = args.scene.as_deref().map(open_scene).transpose()?;
-    let onlooker = onlooker(&args.view, scene.as_ref())?;
-    let lamps: Vec<Lamp> =
-        args.lights.each().iter().map(|l| lamp(l, scene.as_ref())).collect::<Result<_>>()?;
+    let view = choose_view(&args.view.options(), scene.as_ref())?;
+    let lights = args.lights.each().into_iter().map(|l| choose_light(&l, scene.as_ref()));
+    let chosen: Vec<ChosenLight> = lights.collect::<Result<_, _>>()?;
     if let Some(scene) = &scene {
         tell_notices(scene);
     }
     let receivers = scene.as_ref().map(|scene| match args.fit {
         // Of all commands this one alone can do without rays.
         Fit::Box => Ok(Receivers::in_box(scene)),
-        fit => Ok::<_, Error>(Receivers::new(scene, &Tracer::new(scene)?, fit)),
+        fit => Ok::<_, Error>(Receivers::new(scene, &Tracer::new(scene)?, fit.into())),
     });
     let receivers = receivers.transpose()?;
     let bounds = receivers.as_ref().map_or_else(Bounds::default, Receivers::bounds);
-    let spec = &args.shadows;
-    let lights: Vec<Light> = lamps.iter().map(|l| l.light).collect();
+    let technique = &args.shadows;
+    let lights: Vec<Light> = chosen.iter().map(|l| l.light).collect();
     let mut planner = planner();
     let max_side = planner.limits().max_side;
     let plan = planner
-        .plan(&onlooker.camera, &lights, &bounds, spec.technique())
-        .map_err(|e| spec.error(&e))?;
-    let planned = Planned::new(plan, max_side, spec, &onlooker, &lamps, scene.as_ref());
+        .plan(&view.camera, &lights, &bounds, technique.technique())
+        .map_err(|e| technique.blame(e))?;
+    let planned = Planned::new(plan, max_side, technique, &view, &chosen, scene.as_ref());
     if args.json {
         if plan.maps.iter().all(ShadowMap::is_empty) {
-            log::warn!("{}", nothing_served(&onlooker));
+            log::warn!("{}", nothing_served(&view));
         }
         print(&format!("{}\n", serde_json::to_string_pretty(&planned.json())?))
     } else {
@@ -161,9 +163,9 @@ impl<'a> Planned<'a> {
     fn new(
         plan: &'a Plan,
         max_side: u32,
-        spec: &'a Spec,
-        onlooker: &'a Onlooker,
-        lamps: &'a [Lamp],
+        technique: &'a NamedTechnique,
+        view: &'a ChosenView,
+        chosen_lights: &'a [ChosenLight],
         scene: Option<&Scene>,
     ) -> Self {
         let [atlas, layers] = [Atlas::packed, Atlas::layered].map(|lay_out| {
@@ -171,7 +173,7 @@ impl<'a> Planned<'a> {
         });
         let casters = scene.map(|s| casters(plan, s));
         let culled = casters.as_ref().and_then(|c| casters_culled(plan, c));
-        Self { spec, onlooker, lamps, plan, atlas, layers, casters, culled }
+        Self { technique, view, chosen_lights, plan, atlas, layers, casters, culled }
     }
 
     /// x, y, width and height of a map in the atlas, texels.
@@ -198,8 +200,8 @@ impl<'a> Planned<'a> {
             rect: self.rect(i),
             casters: self.casters.as_ref().map(|c| c[i]),
         });
-        let lights = plan.lights.iter().zip(self.lamps).map(|(light, lamp)| LightJson {
-            name: lamp.name.clone(),
+        let lights = plan.lights.iter().zip(self.chosen_lights).map(|(light, chosen)| LightJson {
+            name: chosen.name.clone(),
             theta_deg: light.theta_rad.to_degrees(),
             maps: [light.maps.start, light.maps.end],
         });
@@ -224,12 +226,13 @@ impl<'a> Planned<'a> {
         let mut line = |l: std::fmt::Arguments<'_>| {
             let _ = writeln!(text, "{l}");
         };
-        line(format_args!("shadows         {}", self.spec));
-        for (light, lamp) in plan.lights.iter().zip(self.lamps) {
-            let name = lamp.name.as_deref().filter(|_| self.lamps.len() > 1).unwrap_or("light");
+        line(format_args!("shadows         {}", self.technique));
+        for (light, chosen) in plan.lights.iter().zip(self.chosen_lights) {
+            let name =
+                chosen.name.as_deref().filter(|_| self.chosen_lights.len() > 1).unwrap_or("light");
             line(format_args!("view and {name:<6} {:.2}° apart", light.theta_rad.to_degrees()));
         }
-        let limit = match self.spec.technique().size {
+        let limit = match self.technique.technique().size {
             Size::MaxError(pixels) => format!(", for at most {pixels} px a texel"),
             _ => String::new(),
         };
@@ -254,7 +257,7 @@ impl<'a> Planned<'a> {
             let part = self.part(map.part);
             if map.is_empty() {
                 let nothing = match plan.maps.len() {
-                    1 => nothing_served(self.onlooker),
+                    1 => nothing_served(self.view),
                     _ => "nothing lit there receives shadows".into(),
                 };
                 line(format_args!("map {i}: {part}empty: {nothing}"));
@@ -267,7 +270,7 @@ impl<'a> Planned<'a> {
             };
             let [near, far] = map.split.map(six_digits);
             line(format_args!("map {i}: {part}{size} texels{place}, {near} to {far} metres"));
-            let warp = match (map.lambda, self.spec.technique().warp) {
+            let warp = match (map.lambda, self.technique.technique().warp) {
                 // For light from a point λ is no length in the world.
                 (Some(lambda), _) if map.apex.is_some() => format!("λ = {lambda:.6}"),
                 (Some(lambda), _) => format!("λ = {lambda:.6} m"),
@@ -280,7 +283,7 @@ impl<'a> Planned<'a> {
                 "  pixels a texel  {:.4} across, {:.4} along, {:.4} in the worst direction, at most",
                 e.max_s, e.max_t, e.max
             ));
-            if let Some(Casters { drawn, culled }) = self.casters.as_ref().map(|c| c[i]) {
+            if let Some(MapCasters { drawn, culled }) = self.casters.as_ref().map(|c| c[i]) {
                 let share = percent(culled as f64 / (drawn + culled) as f64);
                 line(format_args!("  casters         {drawn} triangles, {share} culled"));
             }
@@ -296,10 +299,10 @@ impl<'a> Planned<'a> {
 
     /// What a map is for, as far as there are others.
     fn part(&self, part: Part) -> String {
-        let name = || self.lamps[part.light].name.clone().unwrap_or_default();
-        let slices = self.spec.technique().partition.slices;
+        let name = || self.chosen_lights[part.light].name.clone().unwrap_or_default();
+        let slices = self.technique.technique().partition.slices;
         let words = [
-            (self.lamps.len() > 1).then(name),
+            (self.chosen_lights.len() > 1).then(name),
             part.side.map(|s| format!("side {}", side_name(s))),
             part.face.map(|f| format!("{} face", face_name(f))),
             (slices > 1 && part.face != Some(Face::Near)).then(|| format!("slice {}", part.slice)),
@@ -336,14 +339,9 @@ fn side_name(side: CubeSide) -> &'static str {
 }
 
 /// Why all maps are empty.
-fn nothing_served(onlooker: &Onlooker) -> String {
-    let [near, far] = [onlooker.look.near, onlooker.look.far].map(six_digits);
+fn nothing_served(view: &ChosenView) -> String {
+    let [near, far] = [view.look_at.near, view.look_at.far].map(six_digits);
     format!("nothing lit between {near} and {far} metres of the view receives shadows")
-}
-
-/// As many as there is any use in reading.
-pub(crate) fn six_digits(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 fn sides([w, h]: [u32; 2]) -> String {

@@ -1,9 +1,13 @@
 //! A progress bar on standard error, for jobs that take a while.
 
+use crate::output::note;
+use crate::setup::{log_size, tell_backend, tell_notices};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::Once;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use umbrage_lab::Progress;
+use umbrage_scene::Scene;
 
 /// Jobs shorter than this show no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -13,7 +17,7 @@ const STEPS: u64 = 1000;
 
 /// A bar that appears once a job takes longer than a second, on a terminal. A job has parts that count
 /// alike, and each part has rows of rays.
-pub(crate) struct Progress {
+pub(crate) struct Bar {
     bar: ProgressBar,
     start: Instant,
     shown: Once,
@@ -23,17 +27,18 @@ pub(crate) struct Progress {
     rows_done: AtomicU64,
 }
 
-impl Progress {
+impl Bar {
     /// A job of one part with so many rows. `quiet` shows no bar, where logs would break it.
     pub(crate) fn new(rows: u64, quiet: bool) -> Self {
-        let progress = Self::of_parts(1, quiet);
-        progress.begin(rows);
-        progress
+        let bar = Self::of_parts(quiet);
+        bar.parts(1);
+        bar.rows(rows);
+        bar
     }
 
-    /// A job of so many parts.
-    pub(crate) fn of_parts(parts: u64, quiet: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(parts * STEPS), ProgressDrawTarget::hidden());
+    /// A job that will say how many parts it has.
+    pub(crate) fn of_parts(quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let template = "{prefix}{msg:32} {wide_bar} {percent:>3}% {eta:>4}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
@@ -45,35 +50,29 @@ impl Progress {
         let zero = || AtomicU64::new(0);
         Self { bar, start: Instant::now(), shown, parts: zero(), rows: zero(), rows_done: zero() }
     }
+}
 
-    /// What the present part is called.
-    pub(crate) fn name(&self, name: String) {
-        log::info!("{name}");
-        self.bar.set_prefix(name + ": ");
+impl Progress for Bar {
+    fn parts(&self, count: u64) {
+        self.bar.set_length(count * STEPS);
     }
 
-    /// How many rows the present part has.
-    pub(crate) fn begin(&self, rows: u64) {
+    fn part(&self, name: &str) {
+        log::info!("{name}");
+        self.bar.set_prefix(format!("{name}: "));
+    }
+
+    fn rows(&self, rows: u64) {
         self.rows.store(rows, Ordering::Relaxed);
         self.rows_done.store(0, Ordering::Relaxed);
     }
 
-    /// The present part is done.
-    pub(crate) fn end(&self) {
-        self.begin(0);
-        let parts = 1 + self.parts.fetch_add(1, Ordering::Relaxed);
-        self.bar.set_position(parts * STEPS);
-    }
-
-    /// Says what goes on from now.
-    pub(crate) fn stage(&self, name: impl Into<String>) {
-        let name = name.into();
+    fn stage(&self, name: &str) {
         log::debug!("{name}");
-        self.bar.set_message(name);
+        self.bar.set_message(name.to_owned());
     }
 
-    /// So many more rows are done.
-    pub(crate) fn advance(&self, rows: u64) {
+    fn advance(&self, rows: u64) {
         if self.start.elapsed() > PATIENCE {
             // Draws only if standard error is a terminal.
             self.shown.call_once(|| self.bar.set_draw_target(ProgressDrawTarget::stderr()));
@@ -83,13 +82,39 @@ impl Progress {
         self.bar.set_position(self.parts.load(Ordering::Relaxed) * STEPS + STEPS * done / rows);
     }
 
-    /// Lets others write to standard error, with the bar out of their way.
-    pub(crate) fn aside<T>(&self, write: impl FnOnce() -> T) -> T {
-        self.bar.suspend(write)
+    fn end_part(&self) {
+        self.rows(0);
+        let parts = 1 + self.parts.fetch_add(1, Ordering::Relaxed);
+        self.bar.set_position(parts * STEPS);
+    }
+
+    // What is written to standard error has the bar out of its way.
+
+    fn scene(&self, name: &str, scene: &Scene) {
+        self.bar.suspend(|| {
+            log_size(name, scene);
+            tell_notices(scene);
+        });
+    }
+
+    fn failed(&self, view: &str, error: &str) {
+        self.note(&format!("umbrage: view `{view}`: {error}"));
+    }
+
+    fn backend(&self, choice: &str) {
+        self.bar.suspend(|| tell_backend(choice));
+    }
+
+    fn note(&self, line: &str) {
+        self.bar.suspend(|| note(line));
+    }
+
+    fn warn(&self, line: &str) {
+        self.bar.suspend(|| log::warn!("{line}"));
     }
 }
 
-impl Drop for Progress {
+impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

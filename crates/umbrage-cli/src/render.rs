@@ -1,29 +1,38 @@
 //! `umbrage render`: one picture.
 
 use crate::args::{self, Aov, PictureKind};
-use crate::execute::{Execution, Sets};
-use crate::motion::{Motion, Scenery, noise};
-use crate::output::{check_file, note};
-use crate::pixels::{self, NOTHING_TO_SHADOW, Rows, Shadowed, Shape, Texels};
-use crate::progress::Progress;
-use crate::setup::{Onlooker, Receivers, lamp, onlooker, open_scene, tell_notices};
+use crate::output::note;
+use crate::progress::Bar;
+use crate::setup::{announce, open_scene, tell_notices};
 use anyhow::{Context, Result};
-use umbrage::Size;
+use umbrage::{Plan, Size};
+use umbrage_lab::{
+    Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene, Rows,
+    Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan,
+};
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
     write_exr, write_png,
 };
 use umbrage_trace::{View, shade};
 
-/// Everything that pictures are made of; what the picture asked for does not need stays empty.
+/// All that a picture may be made of; what the one asked for does not need stays empty.
 #[derive(Default)]
-struct Layers {
+struct Picture {
     counted: Vec<bool>,
     truth: Shadowed,
     technique: Shadowed,
     texels: Texels,
     shape: Shape,
     noise: Vec<f32>,
+}
+
+/// What a picture is made of.
+#[derive(Clone, Copy)]
+struct Needs {
+    truth: bool,
+    maps: bool,
+    motion: bool,
 }
 
 /// Frames of the motion that shows minification.
@@ -34,81 +43,109 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let kind = args.picture_kind()?;
     check_file(&args.output)?;
     let scene = open_scene(&args.scene.name)?;
-    let Onlooker { camera, look, .. } = onlooker(&args.view, Some(&scene))?;
-    let light = lamp(&args.light, Some(&scene))?.light;
-    let execution = Execution::open(&args.execution, std::slice::from_ref(&args.shadows))?;
-    let sets = Sets::new(&scene, &execution, args.scene.opaque)?;
-    let view = View::new(&sets.tracer, camera, light, args.samples).context("--samples")?;
-    let receivers = Receivers::new(&scene, &sets.tracer, args.fit);
-    let (plan, _) = pixels::plan(&args.shadows, &camera, &light, &receivers.bounds())?;
-
-    let needs_truth = matches!(args.aov, Aov::Truth | Aov::Difference);
-    let needs_map = !matches!(args.aov, Aov::Truth | Aov::Depth | Aov::Normal);
-    let height = u64::from(camera.image()[1]);
-    let map_rows = if needs_map { sets.rows(&plan, &args.shadows) } else { 0 };
-    let moves = args.aov == Aov::Minification;
-    if moves {
-        Motion::Away.check(FRAMES, look, light)?;
+    let chosen = choose_view(&args.view.options(), Some(&scene))?;
+    let light = choose_light(&args.light.options(), Some(&scene))?.light;
+    let backend = args.execution.backend.into();
+    let executors = Executors::open(backend, std::slice::from_ref(&args.shadows))?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.opaque)?;
+    let tracer = render_scene.tracer();
+    let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
+    let receivers = Receivers::new(&scene, tracer, args.fit.into());
+    let bounds = receivers.bounds();
+    let (plan, _) = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
+    let needs = Needs::of(args.aov);
+    if needs.motion {
+        Motion::Away.check(FRAMES, chosen.look_at, light)?;
     }
-    let moving = if moves { u64::from(FRAMES) } else { 0 };
-    let passes = 1 + u64::from(needs_truth) + u64::from(needs_map) + moving;
     tell_notices(&scene);
-    execution.announce();
+    announce(&executors);
     if let Size::MaxError(pixels) = args.shadows.technique().size
-        && needs_map
+        && needs.maps
     {
         note(&format!("texels: {} for at most {pixels} px a texel", plan.texels()));
     }
-    let progress = Progress::new(map_rows + height * passes, quiet);
-    let advance = |rows| progress.advance(rows);
-
-    let mut executor = sets.executor(&args.shadows)?;
-    if needs_map {
-        progress.stage("shadow map");
-        executor.render(&plan, &advance)?;
-    }
-    progress.stage("picture");
-    let mut layers = Layers::default();
-    for range in view.bands() {
-        let rows = Rows::new(&view, range, &advance);
-        let truth = needs_truth.then(|| rows.truth());
-        let strip = if needs_map { Some(executor.strip(&rows)?) } else { None };
-        let shape = match (&truth, &strip) {
-            (Some(truth), _) => truth,
-            (_, Some(strip)) => strip,
-            _ => &executor.shape(&rows)?,
-        };
-        layers.counted.extend(shape.counted());
-        if let Some(truth) = &truth {
-            layers.truth.push(truth);
-        }
-        if let Some(strip) = &strip {
-            layers.technique.push(strip);
-            layers.texels.push(strip);
-        }
-        layers.shape.push(strip.as_ref().unwrap_or(shape));
-    }
-    if moves {
-        let bounds = &receivers.bounds();
-        let scenery = Scenery { sets: &sets, bounds, look, light, samples: 1 };
-        let technique = std::slice::from_ref(&args.shadows);
-        let noise = noise(Motion::Away, FRAMES, &scenery, technique, &progress)?.swap_remove(0);
-        layers.noise = noise.pixels;
+    let technique = args.shadows.technique();
+    let map_rows = if needs.maps { render_scene.rows(&plan, technique) } else { 0 };
+    let height = u64::from(chosen.camera.image()[1]);
+    let bar = Bar::new(map_rows + height * needs.passes(), quiet);
+    let mut picture = Picture::trace(args, needs, &render_scene, &view, &plan, &bar)?;
+    if needs.motion {
+        let (scene, bounds, look_at) = (&render_scene, &bounds, chosen.look_at);
+        let moving = MovingView { scene, bounds, look_at, light, samples: 1 };
+        let techniques = std::slice::from_ref(&args.shadows);
+        let noise = noise(Motion::Away, FRAMES, &moving, techniques, &bar)?.swap_remove(0);
+        picture.noise = noise.pixels;
         if let Some(mean) = noise.mean {
             note(&format!("noise: {mean:.4} (mean change of a pixel's error between frames)"));
         }
     }
-    drop(progress);
-    if (needs_map || needs_truth) && !layers.counted.contains(&true) {
+    drop(bar);
+    if (needs.maps || needs.truth) && !picture.counted.contains(&true) {
         log::warn!("{NOTHING_TO_SHADOW}");
     }
     match kind {
-        PictureKind::Png => layers.write_png(args, &view),
-        PictureKind::Exr => layers.write_exr(args, camera.image()),
+        PictureKind::Png => picture.write_png(args, &view),
+        PictureKind::Exr => picture.write_exr(args, chosen.camera.image()),
     }
 }
 
-impl Layers {
+impl Needs {
+    fn of(aov: Aov) -> Self {
+        Self {
+            truth: matches!(aov, Aov::Truth | Aov::Difference),
+            maps: !matches!(aov, Aov::Truth | Aov::Depth | Aov::Normal),
+            motion: aov == Aov::Minification,
+        }
+    }
+
+    /// How often all of the picture's rows are gone through.
+    fn passes(self) -> u64 {
+        let moving = if self.motion { u64::from(FRAMES) } else { 0 };
+        1 + u64::from(self.truth) + u64::from(self.maps) + moving
+    }
+}
+
+impl Picture {
+    /// Finds out what is needed, but for what moves.
+    fn trace<'a>(
+        args: &args::Render,
+        needs: Needs,
+        scene: &'a RenderScene<'_>,
+        view: &View<'_>,
+        plan: &'a Plan,
+        bar: &Bar,
+    ) -> Result<Self> {
+        let advance = |rows| bar.advance(rows);
+        let mut executor = scene.executor(args.shadows.technique())?;
+        if needs.maps {
+            bar.stage("shadow map");
+            executor.render(plan, &advance)?;
+        }
+        bar.stage("picture");
+        let mut picture = Self::default();
+        for range in view.bands() {
+            let rows = Rows::new(view, range, &advance);
+            let truth = needs.truth.then(|| rows.truth());
+            let strip = if needs.maps { Some(executor.strip(&rows)?) } else { None };
+            let shape = match (&truth, &strip) {
+                (Some(truth), _) => truth,
+                (_, Some(strip)) => strip,
+                _ => &executor.shape(&rows)?,
+            };
+            picture.counted.extend(shape.counted());
+            if let Some(truth) = &truth {
+                picture.truth.push(truth);
+            }
+            if let Some(strip) = &strip {
+                picture.technique.push(strip);
+                picture.texels.push(strip);
+            }
+            picture.shape.push(strip.as_ref().unwrap_or(shape));
+        }
+        Ok(picture)
+    }
+
+    /// Writes what was asked for as colours.
     fn write_png(self, args: &args::Render, view: &View<'_>) -> Result<()> {
         let path = &args.output;
         let size = view.camera().image();
@@ -152,6 +189,7 @@ impl Layers {
         Ok(write_png(path, &picture)?)
     }
 
+    /// Writes what was asked for as numbers.
     fn write_exr(self, args: &args::Render, size: [u32; 2]) -> Result<()> {
         let path = &args.output;
         let plane = |values: Vec<f32>| Ok(write_exr(path, &Image::new(size, values)?)?);

@@ -1,8 +1,7 @@
 //! `umbrage theory`: the papers' closed forms, in numbers.
 
 use crate::args::theory::{Aliasing, Form, FrustumArgs, Lambda, Step, Storage, Theory};
-use crate::output::{aligned, print};
-use crate::plan::six_digits;
+use crate::output::{aligned, print, six_digits};
 use anyhow::{Result, anyhow, bail};
 use serde::Serialize;
 use umbrage::theory::{

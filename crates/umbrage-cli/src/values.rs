@@ -1,20 +1,15 @@
 //! Values that users give: checked numbers, vectors, sizes, from the command line as text.
 
-use crate::args::Share;
-use anyhow::{Result, anyhow, bail, ensure};
+use anyhow::{Error, Result, anyhow, bail};
 use glam::DVec3;
-
-/// The longest side of a picture, pixels.
-const MAX_PICTURE_SIDE: u32 = 16384;
-/// The most pixels of a picture: 8192², with which five techniques take some 8 GB to compare.
-const MAX_PICTURE_PIXELS: u64 = 1 << 26;
+use umbrage_lab::{Share, values};
 
 /// Three numbers with commas between them.
 pub(crate) fn vector(text: &str) -> Result<DVec3> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
         [x, y, z] if text.matches(',').count() == 2 && !text.to_lowercase().contains("nan") => {
-            position([x, y, z])
+            values::position(DVec3::new(x, y, z)).map_err(Error::msg)
         }
         _ => bail!("must be three finite numbers x,y,z without spaces, as in 0,1.5,-4"),
     }
@@ -22,12 +17,12 @@ pub(crate) fn vector(text: &str) -> Result<DVec3> {
 
 /// A vector with a length, from three numbers with commas between them.
 pub(crate) fn direction(text: &str) -> Result<DVec3> {
-    pointing(vector(text)?.to_array())
+    values::pointing(vector(text)?).map_err(Error::msg)
 }
 
 /// A number above zero.
 pub(crate) fn distance(text: &str) -> Result<f64> {
-    metres(text.parse().unwrap_or(f64::NAN))
+    values::metres(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
 /// An error in pixels per texel.
@@ -40,14 +35,15 @@ pub(crate) fn pixels_per_texel(text: &str) -> Result<f64> {
 
 /// An angle in degrees that a picture can have.
 pub(crate) fn field_of_view(text: &str) -> Result<f64> {
-    opening(text.parse().unwrap_or(f64::NAN))
+    values::opening(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
 /// Width and height of a picture, pixels.
 pub(crate) fn picture_size(text: &str) -> Result<[u32; 2]> {
     // A side that is no number is as wrong as one of no pixels.
     let side = |n: &str| n.parse().unwrap_or(0);
-    pixels(text.split_once('x').map_or([0; 2], |(w, h)| [side(w), side(h)]))
+    let size = text.split_once('x').map_or([0; 2], |(w, h)| [side(w), side(h)]);
+    values::pixels(size).map_err(Error::msg)
 }
 
 /// Which of how many equal shares.
@@ -58,46 +54,6 @@ pub(crate) fn share(text: &str) -> Result<Share> {
     share
         .filter(|s| (1..=s.count).contains(&s.index))
         .ok_or_else(|| anyhow!("must be I/N with 1 ≤ I ≤ N, as in 2/8"))
-}
-
-/// A place in a world, metres.
-pub(crate) fn position(v: [f64; 3]) -> Result<DVec3> {
-    let v = DVec3::from(v);
-    ensure!(v.is_finite() && v.abs().max_element() <= 1e12, "must be within 1e12 of the origin");
-    Ok(v)
-}
-
-/// A direction, of any length.
-pub(crate) fn pointing(v: [f64; 3]) -> Result<DVec3> {
-    let v = position(v)?;
-    ensure!(v != DVec3::ZERO, "must point somewhere, as in -0.5,-1,-0.3");
-    Ok(v)
-}
-
-/// A distance, metres.
-pub(crate) fn metres(d: f64) -> Result<f64> {
-    ensure!(d > 0.0 && d <= 1e12, "must be a positive number of metres, at most 1e12, as in 0.1");
-    Ok(d)
-}
-
-/// A picture's angle, degrees.
-pub(crate) fn opening(degrees: f64) -> Result<f64> {
-    ensure!((0.01..=179.0).contains(&degrees), "must be an angle of 0.01 to 179 degrees, as in 60");
-    Ok(degrees)
-}
-
-/// A picture's width and height, pixels.
-pub(crate) fn pixels(size: [u32; 2]) -> Result<[u32; 2]> {
-    ensure!(
-        size.iter().all(|n| (1..=MAX_PICTURE_SIDE).contains(n)),
-        "must be WIDTHxHEIGHT of 1 to {MAX_PICTURE_SIDE} pixels each, as in 960x540"
-    );
-    let pixels = u64::from(size[0]) * u64::from(size[1]);
-    ensure!(
-        pixels <= MAX_PICTURE_PIXELS,
-        "must be at most {MAX_PICTURE_PIXELS} pixels, is {pixels}"
-    );
-    Ok(size)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ mod view;
 
 pub use error::Error;
 pub use gpu::{AdapterReport, Gpu, devices};
-pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Look, Renderer};
+pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
 pub use timer::Timer;

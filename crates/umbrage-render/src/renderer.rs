@@ -47,7 +47,7 @@ pub struct Renderer<'g, 's> {
 
 /// A camera and a light to shade a picture with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look<'a> {
+pub struct Shading<'a> {
     /// The camera that the maps were planned for.
     pub camera: &'a Camera,
     /// One of the plan's lights.
@@ -323,16 +323,16 @@ impl<'g, 's> Renderer<'g, 's> {
     /// The device refused something.
     pub fn frame(
         &mut self,
-        look: &Look<'_>,
+        shading: &Shading<'_>,
         target: &FrameTarget,
         timer: Option<&Timer>,
     ) -> Result<Drawn, Error> {
-        let tile = Tile::whole(look.camera);
+        let tile = Tile::whole(shading.camera);
         let pipelines = self.pipelines("frame", &[FRAME_FORMAT]);
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
         let FrameTarget { color_view, depth, .. } = target;
         let target = Target { color: &[color_view], depth, pipelines: &pipelines };
-        let drawn = self.encode_picture(&mut encoder, look, &tile, &target, timer)?;
+        let drawn = self.encode_picture(&mut encoder, shading, &tile, &target, timer)?;
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
         }
@@ -357,13 +357,13 @@ impl<'g, 's> Renderer<'g, 's> {
     pub(crate) fn encode_picture(
         &mut self,
         encoder: &mut CommandEncoder,
-        look: &Look<'_>,
+        shading: &Shading<'_>,
         tile: &Tile,
         target: &Target<'_>,
         timer: Option<&Timer>,
     ) -> Result<Drawn, Error> {
         let Self { gpu, scene, instances, .. } = self;
-        let Look { camera, light, light_index } = *look;
+        let Shading { camera, light, light_index } = *shading;
         debug_assert!(
             self.eye == DVec3::ZERO || self.eye == camera.eye(),
             "render space is the eye's"

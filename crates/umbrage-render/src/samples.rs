@@ -1,6 +1,6 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
-use crate::renderer::{Look, Renderer, Target};
+use crate::renderer::{Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
 use glam::{Vec2, Vec3, Vec4};
@@ -49,12 +49,12 @@ impl Renderer<'_, '_> {
     /// The device refused something or was lost.
     pub fn samples(
         &mut self,
-        look: &Look<'_>,
+        shading: &Shading<'_>,
         rows: Range<u32>,
         grid: u32,
         wants_texels: bool,
     ) -> Result<Vec<Sample>, Error> {
-        let width = look.camera.image()[0] * grid;
+        let width = shading.camera.image()[0] * grid;
         let [first, end] = [rows.start * grid, rows.end * grid];
         let nothing = Sample::new(Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, 0.0, -1.0, 0.0));
         let mut samples = vec![nothing; (width as usize) * (end - first) as usize];
@@ -67,7 +67,7 @@ impl Renderer<'_, '_> {
             for left in (0..width).step_by(side as usize) {
                 let size = [side.min(width - left), side.min(end - top)];
                 let tile = Tile { origin: [left, top], size, grid };
-                let data = layers.draw(self, look, &tile, &picture, texels.as_ref())?;
+                let data = layers.draw(self, shading, &tile, &picture, texels.as_ref())?;
                 for (i, sample) in data.into_iter().enumerate() {
                     let [x, y] = [i as u32 % size[0] + left, i as u32 / size[0] + top - first];
                     let pixel = (y / grid) * (width / grid) + x / grid;
@@ -141,7 +141,7 @@ impl Layers {
     fn draw(
         &self,
         renderer: &mut Renderer<'_, '_>,
-        look: &Look<'_>,
+        shading: &Shading<'_>,
         tile: &Tile,
         picture: &[wgpu::RenderPipeline; 2],
         texels: Option<&[wgpu::RenderPipeline; 2]>,
@@ -153,12 +153,12 @@ impl Layers {
         let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
         let mut encoder = device.create_command_encoder(&Default::default());
         let target = Target { color: &[&first, &second], depth: &depth, pipelines: picture };
-        renderer.encode_picture(&mut encoder, look, &full, &target, None)?;
+        renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
         self.copy(&mut encoder, 0, 0);
         self.copy(&mut encoder, 1, 1);
         if let Some(texels) = texels {
             let target = Target { color: &[&first], depth: &depth, pipelines: texels };
-            renderer.encode_picture(&mut encoder, look, &full, &target, None)?;
+            renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
             self.copy(&mut encoder, 0, 2);
         }
         renderer.gpu.queue().submit([encoder.finish()]);

@@ -145,6 +145,13 @@ impl<'a> View<'a> {
         })
     }
 
+    /// Whether the shadow on a surface counts where pictures are compared: it [faces the
+    /// light](Sample::is_facing), and its depth, metres, is within the camera's far distance, beyond
+    /// which no map serves. Whoever found the surface, this decides.
+    pub fn counts(&self, is_facing: bool, depth: f64) -> bool {
+        is_facing && depth <= self.camera.far()
+    }
+
     /// The true visibility of the sample, 1 or 0, found by one ray to the light itself.
     ///
     /// Every surface between a spot or point light and the sample casts, the light's own housing
@@ -199,28 +206,6 @@ impl Band {
                     samples.iter().map(|s| s.as_ref().map_or_else(T::default, &value)).collect();
                 progress(1);
                 row
-            })
-            .collect()
-    }
-
-    /// For each pixel, the mean of `values` (one per sample) over those of its samples that face
-    /// the light and have a depth of at most `far` metres. `None` for a pixel without such samples,
-    /// which is not counted.
-    ///
-    /// # Panics
-    /// If `values` does not have one value per sample.
-    pub fn means_facing(&self, values: &[f32], far: f64) -> Vec<Option<f32>> {
-        assert_eq!(values.len(), self.samples.len(), "one value a sample");
-        let per_pixel = self.samples_per_pixel();
-        let pixels = self.samples.chunks(per_pixel).zip(values.chunks(per_pixel));
-        pixels
-            .map(|(samples, values)| {
-                let counted = samples
-                    .iter()
-                    .zip(values)
-                    .filter(|(s, _)| s.is_some_and(|s| s.is_facing && s.depth <= far));
-                let (sum, count) = counted.fold((0.0, 0u32), |(sum, n), (_, v)| (sum + v, n + 1));
-                (count > 0).then(|| sum / count as f32)
             })
             .collect()
     }

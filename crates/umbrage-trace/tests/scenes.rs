@@ -8,7 +8,7 @@ use std::path::Path;
 use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique};
 use umbrage_scene::Scene;
 use umbrage_testing::{needs, third_party_scenes};
-use umbrage_trace::{Ray, Reference, Tracer, View};
+use umbrage_trace::{Ray, Reference, Sample, Tracer, View};
 
 fn load(name: &str) -> Scene {
     let path = Path::new(third_party_scenes!()).join(name);
@@ -84,15 +84,15 @@ fn a_built_in_world_comes_out_right() {
 fn comes_out_right(tracer: &Tracer<'_>, camera: Camera, light: Light) {
     let view = View::new(tracer, camera, light, 1).unwrap();
     let band = view.band(0..270, &nobody);
-    let truth = band.means_facing(&band.map(|s| view.truth(s), &nobody), camera.far());
+    let counts = |s: &Sample| view.counts(s.is_facing, s.depth);
+    let truth = band.map(|s| counts(s).then(|| view.truth(s)), &nobody);
     let bounds = Bounds::of_scene(tracer.bounds());
     let mut planner = Planner::new();
     for text in ["adaptive@2048", "adaptive:pcf2@2048"] {
         let technique: Technique = text.parse().unwrap();
         let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
         let reference = Reference::render(tracer, plan, &nobody).unwrap();
-        let lit = band.map(|s| reference.visibility(0, s), &nobody);
-        let lit = band.means_facing(&lit, camera.far());
+        let lit = band.map(|s| counts(s).then(|| reference.visibility(0, s)), &nobody);
         let pairs = truth.iter().zip(&lit).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
         let (wrong, all) = pairs.fold((0, 0), |(wrong, all), (truth, lit)| {
             (wrong + usize::from((truth - lit).abs() > 0.5), all + 1)

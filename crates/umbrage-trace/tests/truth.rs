@@ -437,23 +437,6 @@ fn pictures_come_in_bands_and_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn pixels_average_their_facing_samples() {
-    let scene = builtin("sphere", Some(32)).unwrap();
-    let tracer = Tracer::new(&scene).unwrap();
-    let light = Light::Directional { direction: DVec3::new(1.0, -1.25, 0.4) };
-    let camera = camera(DVec3::new(-2.5, 3.4, 7.5), DVec3::Y, [90, 60]);
-    let view = View::new(&tracer, camera, light, 4).unwrap();
-    let band = view.band(0..60, &nobody);
-    let truth = band.map(|s| view.truth(s), &nobody);
-    let means = band.means_facing(&truth, 1e4);
-    assert_eq!(means.len(), 90 * 60);
-    assert!(means.iter().any(Option::is_none), "sky");
-    let partial = means.iter().flatten().filter(|&&v| v > 0.0 && v < 1.0).count();
-    assert!((20..500).contains(&partial), "{partial} pixels on the outline");
-    assert!(band.means_facing(&truth, 0.1).iter().all(Option::is_none), "all beyond 10 cm");
-}
-
-#[test]
 fn a_soup_of_slivers_is_survived() {
     // Needles a micrometre wide, one of them so flat that its normal is mostly rounding error.
     let needles: Vec<_> = (0..100)

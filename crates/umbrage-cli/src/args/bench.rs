@@ -1,6 +1,7 @@
 //! `umbrage bench` and `umbrage devices`: what may be asked for.
 
-use super::{LightArgs, SceneArgs, TechniqueArgs, ViewArgs};
+use super::technique::TechniqueArgs;
+use super::view::{LightArgs, SceneArgs, ViewArgs};
 use anyhow::Result;
 use clap::Args;
 
@@ -36,8 +37,8 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(super) fn check(&mut self) -> Result<()> {
-        self.view.check()?;
-        self.light.check()?;
+        self.view.options().check()?;
+        self.light.options().check()?;
         self.techniques.check()
     }
 }

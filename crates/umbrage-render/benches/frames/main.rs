@@ -19,7 +19,7 @@ use std::path::Path;
 use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Bounds, Camera, Light, Plan, Planner, Technique};
-use umbrage_render::{FrameTarget, Gpu, Look, Renderer, SceneBuffers};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading};
 use umbrage_scene::Scene;
 use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
@@ -69,8 +69,8 @@ impl<'a> Set<'a> {
         target: &FrameTarget,
     ) -> Result<(), Failure> {
         renderer.draw_maps(plan, Casters::Moved, None)?;
-        let look = Look { camera: &self.camera, light: &self.light, light_index: 0 };
-        renderer.frame(&look, target, None)?;
+        let shading = Shading { camera: &self.camera, light: &self.light, light_index: 0 };
+        renderer.frame(&shading, target, None)?;
         Ok(self.gpu.wait()?)
     }
 }

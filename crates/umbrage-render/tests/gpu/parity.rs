@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use umbrage::{Camera, Light, Plan, Size, SpotLight, Technique};
-use umbrage_render::{Look, Renderer, Sample, SceneBuffers};
+use umbrage_render::{Renderer, Sample, SceneBuffers, Shading};
 use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
@@ -73,7 +73,7 @@ fn compare(
         let normal = gpu.normal.as_dvec3().dot(sample.surface.shading_normal);
         d.surface +=
             usize::from(depth > 1e-3 || normal < 0.999 || gpu.is_facing != sample.is_facing);
-        if !sample.is_facing || sample.depth > set.camera.far() {
+        if !view.counts(sample.is_facing, sample.depth) {
             continue;
         }
         d.counted += 1;
@@ -102,14 +102,14 @@ fn compare(
 fn draw(
     set: &Set<'_>,
     plan: &Plan,
-    look: &Look<'_>,
+    shading: &Shading<'_>,
     options: &ShadowOptions,
     support: Support,
 ) -> Vec<Sample> {
     let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
     let mut renderer = Renderer::with_support(&GPU, &buffers, options, support).unwrap();
     renderer.draw_maps(plan, Casters::Unmoved, None).unwrap();
-    renderer.samples(look, 0..set.camera.image()[1], 1, true).unwrap()
+    renderer.samples(shading, 0..set.camera.image()[1], 1, true).unwrap()
 }
 
 /// Checks the shares of counted samples that may differ.
@@ -148,9 +148,9 @@ fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
 fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     let light = set.light();
     let plan = set.plan(&[light], technique);
-    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
-    let samples = draw(set, &plan, &look, &options, GPU.support());
+    let samples = draw(set, &plan, &shading, &options, GPU.support());
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     let difference = compare(set, &plan, (0, &light), &samples, &reference);
     check(name, technique, &difference);
@@ -254,14 +254,14 @@ fn every_fallback_draws_the_same_picture() {
     let scene = scene("town:20");
     let set = Set::new(&scene, IMAGE);
     let light = set.light();
-    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let all = GPU.support();
     for filter in [Filter::Hard, Filter::Pcf { n: 3 }] {
         let technique = technique(TECHNIQUES[7], filter);
         let plan = set.plan(&[light], &technique);
         let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
         let difference = |options: ShadowOptions, support| {
-            let samples = draw(&set, &plan, &look, &options, support);
+            let samples = draw(&set, &plan, &shading, &options, support);
             compare(&set, &plan, (0, &light), &samples, &reference)
         };
         let base = ShadowOptions { filter, ..ShadowOptions::default() };
@@ -381,9 +381,9 @@ fn several_lights_share_a_plan() {
     let plan = set.plan(&lights, &technique);
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     for (index, light) in lights.iter().enumerate() {
-        let look = Look { camera: &set.camera, light, light_index: index as u32 };
+        let shading = Shading { camera: &set.camera, light, light_index: index as u32 };
         let options = ShadowOptions { filter: plan.filter, ..ShadowOptions::default() };
-        let samples = draw(&set, &plan, &look, &options, GPU.support());
+        let samples = draw(&set, &plan, &shading, &options, GPU.support());
         let difference = compare(&set, &plan, (index, light), &samples, &reference);
         check(&format!("lantern, light {index}"), &technique, &difference);
     }
@@ -416,8 +416,8 @@ fn a_million_metres_from_the_origin() {
     for text in &TECHNIQUES[3..5] {
         let technique = technique(text, Filter::Hard);
         let plan = set.plan(&[light], &technique);
-        let look = Look { camera: &set.camera, light: &light, light_index: 0 };
-        let samples = draw(&set, &plan, &look, &ShadowOptions::default(), GPU.support());
+        let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+        let samples = draw(&set, &plan, &shading, &ShadowOptions::default(), GPU.support());
         let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
         let difference = compare(&set, &plan, (0, &light), &samples, &reference);
         check("pole", &technique, &difference);

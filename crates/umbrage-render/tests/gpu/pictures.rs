@@ -2,7 +2,7 @@
 
 use crate::{GPU, Set, scene};
 use umbrage::{Partition, Technique};
-use umbrage_render::{FrameTarget, Look, Renderer, SceneBuffers, Timer};
+use umbrage_render::{FrameTarget, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_testing::needs;
 use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -47,17 +47,17 @@ fn a_frame_looks_as_its_samples_do() {
     let set = Set::new(&scene, [301, 170]);
     let light = set.light();
     let plan = set.plan(&[light], &Technique::default());
-    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
     let timer = Timer::new(&GPU).expect("timestamps");
     let drawn = renderer.draw_maps(&plan, Casters::Unmoved, Some(&timer)).unwrap();
     assert!(drawn[0].1.triangles > 1000 && drawn[0].1.draws > 0, "{drawn:?}");
     let target = FrameTarget::new(&GPU, set.camera.image()).unwrap();
-    renderer.frame(&look, &target, Some(&timer)).unwrap();
+    renderer.frame(&shading, &target, Some(&timer)).unwrap();
     let [depth, _, shade_ms] = timer.read(&GPU).unwrap();
     assert!(depth > 0.0 && shade_ms > 0.0 && depth + shade_ms < 60e3, "{depth} {shade_ms}");
-    let samples = renderer.samples(&look, 0..170, 1, false).unwrap();
+    let samples = renderer.samples(&shading, 0..170, 1, false).unwrap();
     let radiance: Vec<_> = samples.iter().map(|s| s.radiance).collect();
     let far = |(a, b): &([u8; 3], [u8; 3])| (0..3).any(|i| a[i].abs_diff(b[i]) > 1);
     let pairs = read(&target).into_iter().zip(shade::pixels(&radiance, 1));
@@ -77,13 +77,13 @@ fn samples_are_those_of_a_larger_picture() {
     let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
     let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
     renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
-    let look = Look { camera: &coarse.camera, light: &light, light_index: 0 };
+    let shading = Shading { camera: &coarse.camera, light: &light, light_index: 0 };
     // Two times 700 samples do not fit into one tile.
-    let samples = renderer.samples(&look, 40..70, 2, true).unwrap();
+    let samples = renderer.samples(&shading, 40..70, 2, true).unwrap();
     assert_eq!(samples.len(), 700 * 30 * 4);
     let fine = Set::new(&scene, [1400, 192]);
-    let look = Look { camera: &fine.camera, light: &light, light_index: 0 };
-    let all = renderer.samples(&look, 0..192, 1, true).unwrap();
+    let shading = Shading { camera: &fine.camera, light: &light, light_index: 0 };
+    let all = renderer.samples(&shading, 0..192, 1, true).unwrap();
     let mut differing = 0;
     for (i, sample) in samples.iter().enumerate() {
         let (pixel, within) = (i / 4, i % 4);

@@ -2,7 +2,7 @@
 
 use crate::{GPU, Set, scene};
 use umbrage::{Size, Technique, Warp};
-use umbrage_render::{Error, FrameTarget, Gpu, Look, Renderer, SceneBuffers, devices};
+use umbrage_render::{Error, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, devices};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
@@ -23,13 +23,13 @@ fn a_lost_device_is_reported() {
     let set = Set::new(&scene, [32, 18]);
     let light = set.light();
     let plan = set.plan(&[light], &Technique::default());
-    let look = Look { camera: &set.camera, light: &light, light_index: 0 };
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let buffers = SceneBuffers::new(&gpu, &scene, false).unwrap();
     let mut renderer = Renderer::new(&gpu, &buffers, &ShadowOptions::default()).unwrap();
     renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
     gpu.device().destroy();
     let lost = |e: Error| assert!(matches!(e, Error::Lost(_)), "{e}");
-    lost(renderer.samples(&look, 0..18, 1, true).unwrap_err());
+    lost(renderer.samples(&shading, 0..18, 1, true).unwrap_err());
     lost(renderer.visibility(&plan, 0, &[[set.camera.eye(); 2]]).unwrap_err());
     renderer.draw_maps(&plan, Casters::Moved, None).map_or_else(lost, drop);
 }

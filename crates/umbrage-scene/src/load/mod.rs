@@ -1,10 +1,10 @@
 //! Loads glTF 2.0 files.
 
 mod accessor;
+mod cameras_and_lights;
 mod document;
 mod hierarchy;
 mod material;
-mod onlookers;
 mod primitive;
 mod skin;
 mod uri;
@@ -68,7 +68,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
     }
     let bounds = loader.check_drawn()?;
     for &node in &hierarchy.shown {
-        loader.load_onlooker(node, bounds)?;
+        loader.load_camera_and_light(node, bounds)?;
     }
     Ok(loader.finish())
 }
@@ -268,20 +268,27 @@ impl Loader<'_> {
         Ok(bounds)
     }
 
-    fn load_onlooker(&mut self, index: usize, bounds: Aabb) -> Result<(), SceneError> {
+    fn load_camera_and_light(&mut self, index: usize, bounds: Aabb) -> Result<(), SceneError> {
         let node = &self.document.root.nodes[index];
         let world = &self.hierarchy.world_from_node[index];
         let name = node.name.as_deref();
         if let Some(camera) = node.camera {
             let notices = &mut self.notices;
-            let camera =
-                onlookers::load_camera(self.document, camera, name, world, bounds, notices)?;
+            let camera = cameras_and_lights::load_camera(
+                self.document,
+                camera,
+                name,
+                world,
+                bounds,
+                notices,
+            )?;
             self.scene.cameras.extend(camera);
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
         if let Some(light) = light {
             let (index, notices) = (light.light.value(), &mut self.notices);
-            let light = onlookers::load_light(self.document, index, name, world, bounds, notices)?;
+            let light =
+                cameras_and_lights::load_light(self.document, index, name, world, bounds, notices)?;
             self.scene.lights.extend(light);
         }
         Ok(())

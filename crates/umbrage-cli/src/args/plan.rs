@@ -1,0 +1,65 @@
+//! `umbrage plan`: its options.
+
+use super::technique::{Fit, TexelArgs};
+use super::view::{LightsArgs, ViewArgs};
+use anyhow::{Result, ensure};
+use clap::Args;
+use umbrage_lab::NamedTechnique;
+
+/// `umbrage plan`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage plan town --shadows adaptive+z4@2048 --json
+  umbrage plan town --shadows lispsm+z3 --max-error 1
+  umbrage plan --eye 0,2,0 --target 0,2,-1 --fov 60 --near 0.1 --far 500 --size 1280x720 \\
+      --sun 0.3,-1,0.2 --shadows lispsm@1024 --json")]
+pub(crate) struct Plan {
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them). Without one, the whole
+    /// view between --near and --far is served.
+    #[arg(value_name = "SCENE")]
+    pub(crate) scene: Option<String>,
+    /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
+    #[arg(long, value_name = "SPEC", default_value = "adaptive")]
+    pub(crate) shadows: NamedTechnique,
+    #[command(flatten)]
+    pub(crate) texels: TexelArgs,
+    /// What the maps are fitted to, and their errors the largest over.
+    #[arg(long, value_enum, default_value_t = Fit::Box)]
+    pub(crate) fit: Fit,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) lights: LightsArgs,
+}
+
+impl Plan {
+    pub(super) fn check(&mut self) -> Result<()> {
+        self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
+        self.view.options().check()?;
+        self.lights.check()?;
+        if self.scene.is_some() {
+            return Ok(());
+        }
+        let view = &self.view;
+        let given = [
+            ("--eye", view.eye.is_some()),
+            ("--target", view.target.is_some()),
+            ("--near", view.near.is_some()),
+            ("--far", view.far.is_some()),
+        ];
+        for (option, is_given) in given {
+            ensure!(is_given, "{option} is needed where no SCENE is given");
+        }
+        for (option, is_given) in
+            [("--camera", view.camera.is_some()), ("--light", self.lights.names_any())]
+        {
+            ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
+        }
+        ensure!(self.fit == Fit::Box, "--fit surfaces needs a SCENE, whose surfaces they are");
+        Ok(())
+    }
+}

@@ -1,0 +1,118 @@
+//! Scene, view and light: options that many commands share.
+
+use crate::values;
+use anyhow::{Result, ensure};
+use clap::Args;
+use glam::DVec3;
+use umbrage_lab::{LightOptions, ViewOptions};
+
+/// Size of pictures where none is given.
+pub(super) const DEFAULT_SIZE: &str = "960x540";
+
+/// Which scene.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them), with a size if you
+    /// like: town:200.
+    #[arg(value_name = "SCENE")]
+    pub(crate) name: String,
+    /// Alpha-masked materials cast and show as solid.
+    #[arg(long)]
+    pub(crate) opaque: bool,
+}
+
+/// The view. What is left out comes from the scene.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "View")]
+pub(crate) struct ViewArgs {
+    /// Position of the viewer, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) eye: Option<DVec3>,
+    /// Point in the middle of the picture, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) target: Option<DVec3>,
+    /// Direction that is up in the picture.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    pub(crate) up: Option<DVec3>,
+    /// Vertical field of view, degrees.
+    #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true)]
+    pub(crate) fov: Option<f64>,
+    /// Distance at which the view begins, metres.
+    #[arg(long, value_name = "N", value_parser = values::distance, allow_hyphen_values = true)]
+    pub(crate) near: Option<f64>,
+    /// Distance at which it ends, metres.
+    #[arg(long, value_name = "F", value_parser = values::distance, allow_hyphen_values = true)]
+    pub(crate) far: Option<f64>,
+    /// Size of the picture, pixels.
+    #[arg(
+        long, value_name = "WxH", value_parser = values::picture_size, allow_hyphen_values = true,
+        default_value = DEFAULT_SIZE
+    )]
+    pub(crate) size: [u32; 2],
+    /// A camera of the scene, by name.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+}
+
+/// What shines. Left out: the scene's first light, else a 45° afternoon sun.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct LightArgs {
+    /// Parallel light: the way it travels.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    pub(crate) sun: Option<DVec3>,
+    /// A light of the scene, by name.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) light: Option<String>,
+}
+
+/// What shines, one light or more. Left out: as for one.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct LightsArgs {
+    /// Parallel light: the way it travels.
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    sun: Option<DVec3>,
+    /// A light of the scene, by name; once for each.
+    #[arg(long, value_name = "NAME")]
+    light: Vec<String>,
+}
+
+impl ViewArgs {
+    /// The view that is asked for.
+    pub(crate) fn options(&self) -> ViewOptions {
+        let Self { eye, target, up, fov, near, far, size, ref camera } = *self;
+        ViewOptions { eye, target, up, fov_deg: fov, near, far, size, camera: camera.clone() }
+    }
+}
+
+impl LightArgs {
+    /// The light that is asked for.
+    pub(crate) fn options(&self) -> LightOptions {
+        LightOptions { sun: self.sun, light: self.light.clone() }
+    }
+}
+
+impl LightsArgs {
+    /// Whether a light of the scene is named.
+    pub(super) fn names_any(&self) -> bool {
+        !self.light.is_empty()
+    }
+
+    /// Each light for itself; one that says nothing if none was named.
+    pub(crate) fn each(&self) -> Vec<LightOptions> {
+        let one = |light| LightOptions { sun: self.sun, light };
+        if self.light.is_empty() {
+            vec![one(None)]
+        } else {
+            self.light.iter().cloned().map(Some).map(one).collect()
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        for (i, name) in self.light.iter().enumerate() {
+            ensure!(!self.light[..i].contains(name), "--light: `{name}` is given twice");
+        }
+        Ok(self.each().iter().try_for_each(LightOptions::check)?)
+    }
+}

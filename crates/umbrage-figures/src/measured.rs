@@ -1,0 +1,61 @@
+//! What the planner really makes of a view, to be held against the closed forms.
+
+use anyhow::Result;
+use glam::DVec3;
+use umbrage::aliasing::PointError;
+use umbrage::theory::View;
+use umbrage::{
+    Bounds, Camera, Faces, Light, LookAt, Partition, Plan, Planner, Size, Technique, Warp,
+};
+
+/// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that of
+/// resolutions left out.
+pub(crate) fn camera(view: View) -> Result<Camera> {
+    camera_of(view, 1)
+}
+
+/// The same of so many pixels each way.
+pub(crate) fn camera_of(view: View, side: u32) -> Result<Camera> {
+    Ok(Camera::look_at(LookAt {
+        eye: DVec3::ZERO,
+        target: DVec3::NEG_Z,
+        up: DVec3::Y,
+        fov_y_rad: 2.0 * view.half_fov_rad(),
+        near: view.near(),
+        far: view.far(),
+        image: [side; 2],
+    })?)
+}
+
+/// The way of light that comes from above, behind the viewer, at an angle θ to the view.
+pub(crate) fn from_behind(theta_rad: f64) -> DVec3 {
+    // The sine and cosine of 90° in floating point are not.
+    let (sin, cos) =
+        if theta_rad == std::f64::consts::FRAC_PI_2 { (1.0, 0.0) } else { theta_rad.sin_cos() };
+    DVec3::new(0.0, -sin, -cos)
+}
+
+/// Maps of one texel for all of a view, in parallel light of this direction, cut into self-similar slices.
+pub(crate) fn plan(
+    view: View,
+    direction: DVec3,
+    warp: Warp,
+    slices: u32,
+    faces: Faces,
+) -> Result<Plan> {
+    let technique = Technique {
+        warp,
+        partition: Partition { faces, ..Partition::slices(slices) },
+        size: Size::Exact([1; 2]),
+        ..Technique::default()
+    };
+    let light = Light::Directional { direction };
+    Ok(Planner::new().plan(&camera(view)?, &[light], &Bounds::default(), &technique)?.clone())
+}
+
+/// Perspective errors of a plan's first map in the middle of the view at a distance, pixels per texel.
+pub(crate) fn error_at(plan: &Plan, view: View, z: f64) -> Result<PointError> {
+    plan.maps[0]
+        .perspective_error(&camera(view)?, DVec3::NEG_Z * z)
+        .ok_or_else(|| anyhow::anyhow!("the map does not serve the view {z} m away"))
+}

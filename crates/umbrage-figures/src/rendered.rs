@@ -1,0 +1,94 @@
+//! Pictures of shadows that were really rendered, side by side.
+
+use crate::chart;
+use anyhow::Result;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use std::fmt::Write;
+use umbrage::{Bounds, Camera, Light, LookAt};
+use umbrage_lab::{NamedTechnique, Rows, Shadowed};
+use umbrage_measure::{Image, PngPixel, Rgb, png};
+use umbrage_scene::Scene;
+use umbrage_trace::{Reference, Tracer, View};
+
+/// Width and height of a picture, pixels.
+const TILE: [u32; 2] = [270, 180];
+const GAP: u32 = 8;
+const LABEL: u32 = 22;
+
+/// A built-in scene with a view into it.
+pub(crate) struct Shot<'a> {
+    tracer: &'a Tracer<'a>,
+    bounds: Bounds<'a>,
+    camera: Camera,
+    light: Light,
+}
+
+impl<'a> Shot<'a> {
+    /// `change` makes it from the scene's own view.
+    pub(crate) fn new(
+        scene: &Scene,
+        tracer: &'a Tracer<'a>,
+        light: Light,
+        change: impl FnOnce(&mut LookAt),
+    ) -> Result<Self> {
+        let mut view = scene.default_view().look_at(TILE);
+        change(&mut view);
+        let camera = Camera::look_at(view)?;
+        Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })
+    }
+
+    /// What a technique, as on the command line, makes of it.
+    pub(crate) fn picture(&self, technique: &str) -> Result<Image<Rgb>> {
+        let technique: NamedTechnique = technique.parse()?;
+        let (plan, _) = umbrage_lab::plan(&technique, &self.camera, &self.light, &self.bounds)?;
+        let reference = Reference::render(self.tracer, &plan, &|_| {})?;
+        // Pixels at their centres, as renderers shade.
+        let view = View::new(self.tracer, self.camera, self.light, 1)?;
+        let mut picture = Shadowed::default();
+        for rows in view.bands() {
+            picture.push(&Rows::new(&view, rows, &|_| {}).by_reference(&plan, &reference));
+        }
+        Ok(Image::new(TILE, picture.color)?)
+    }
+}
+
+/// Pictures in rows of `columns`, each with what it is written below, as one drawing.
+pub(crate) fn sheet(
+    title: &str,
+    columns: usize,
+    pictures: &[(String, Image<Rgb>)],
+) -> Result<String> {
+    let rows = pictures.len().div_ceil(columns) as u32;
+    let [width, height] = [
+        columns as u32 * (TILE[0] + GAP) + GAP,
+        chart::TITLE_HEIGHT + rows * (TILE[1] + LABEL + GAP),
+    ];
+    let mut svg = format!(
+        "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" \
+         font-size=\"14\" text-anchor=\"middle\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n<text x=\"{}\" y=\"22\" \
+         font-size=\"16\">{title}</text>\n",
+        width / 2
+    );
+    for (i, (label, picture)) in pictures.iter().enumerate() {
+        let x = GAP + (i % columns) as u32 * (TILE[0] + GAP);
+        let y = chart::TITLE_HEIGHT + (i / columns) as u32 * (TILE[1] + LABEL + GAP);
+        let [x, y, w, h] = [x, y, TILE[0], TILE[1]].map(|n| n as i32);
+        svg += &embedded([x, y], [w, h], picture)?;
+        writeln!(svg, "<text x=\"{}\" y=\"{}\">{label}</text>", x + w / 2, y + h + 16)?;
+    }
+    svg += "</svg>\n";
+    Ok(svg)
+}
+
+/// A picture as part of the SVG, its upper left corner at `at`.
+pub(crate) fn embedded<P: PngPixel>(
+    [x, y]: [i32; 2],
+    [w, h]: [i32; 2],
+    image: &Image<P>,
+) -> Result<String> {
+    let data = STANDARD.encode(png(image)?);
+    Ok(format!(
+        "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" href=\"data:image/png;base64,{data}\"/>\n"
+    ))
+}

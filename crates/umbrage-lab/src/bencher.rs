@@ -1,0 +1,126 @@
+//! What a frame costs.
+
+use crate::error::{About, Error, Field};
+use crate::executor::{Executor, OnGpu, RenderScene, Work};
+use crate::planning::milliseconds;
+use crate::strip::Rows;
+use std::time::Instant;
+use umbrage::visibility::Filter;
+use umbrage::{Plan, Technique};
+use umbrage_render::{Drawn, FrameTarget, Shading, Timer};
+use umbrage_trace::{Reference, Tracer, View};
+use umbrage_wgpu::Casters;
+
+/// What a frame cost, times in milliseconds.
+#[derive(Clone, Debug)]
+pub struct Costs {
+    /// Memory of what lookup reads.
+    pub bytes: u64,
+    /// Drawing the maps.
+    pub depth: f64,
+    /// Filtering them, where it is told apart from `depth`, and there is any.
+    pub filter: Option<f64>,
+    /// Drawing the picture.
+    pub shade: f64,
+    /// Into which map, by its index in the plan, what was drawn, where that is told.
+    pub drawn: Option<Vec<(usize, Drawn)>>,
+}
+
+/// Draws frame after frame of one technique for a stop-watch.
+pub struct Bencher<'a> {
+    executor: Executor<'a>,
+    /// What a GPU draws into, and its watch if it has one.
+    target: Option<(FrameTarget, Option<Timer>)>,
+}
+
+impl<'a> Bencher<'a> {
+    /// Who draws frames of so many pixels.
+    ///
+    /// # Errors
+    /// What a GPU refuses.
+    pub fn new(
+        scene: &'a RenderScene<'_>,
+        technique: &Technique,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        let executor = scene.executor(technique)?;
+        let target = match &executor.work {
+            Work::Gpu(on) => {
+                Some((FrameTarget::new(on.gpu, size).about(Field::Size)?, Timer::new(on.gpu)))
+            }
+            Work::Reference { .. } => None,
+        };
+        Ok(Self { executor, target })
+    }
+
+    /// Who draws.
+    pub fn executor(&self) -> &Executor<'_> {
+        &self.executor
+    }
+
+    /// Whether the GPU tells how long its passes take.
+    pub fn has_timestamps(&self) -> bool {
+        matches!(self.target, Some((_, Some(_))))
+    }
+
+    /// Draws a frame, and waits until it is done. `still`: maps that are as they were are not drawn
+    /// again.
+    ///
+    /// # Errors
+    /// What a GPU refuses, or maps that do not fit into memory.
+    pub fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs, Error> {
+        match (&mut self.executor.work, &self.target) {
+            (Work::Gpu(on), Some((target, timer))) => {
+                let casters = if still { Casters::Unmoved } else { Casters::Moved };
+                frame_on_gpu(on, target, timer.as_ref(), view, plan, casters)
+            }
+            (Work::Reference { tracer, .. }, _) => frame_by_reference(tracer, view, plan),
+            (Work::Gpu(_), None) => unreachable!("a GPU was given a target"),
+        }
+    }
+}
+
+fn frame_on_gpu(
+    on: &mut OnGpu<'_>,
+    target: &FrameTarget,
+    timer: Option<&Timer>,
+    view: &View<'_>,
+    plan: &Plan,
+    casters: Casters,
+) -> Result<Costs, Error> {
+    let OnGpu { renderer, gpu, .. } = on;
+    let start = Instant::now();
+    let shading = Shading { camera: view.camera(), light: view.light(), light_index: 0 };
+    let drawn = renderer.draw_maps(plan, casters, timer)?;
+    let [depth, filter, shade] = match timer {
+        Some(timer) => {
+            renderer.frame(&shading, target, Some(timer))?;
+            timer.read(gpu)?
+        }
+        None => {
+            gpu.wait()?;
+            let depth = milliseconds(start);
+            let shaded = Instant::now();
+            renderer.frame(&shading, target, None)?;
+            gpu.wait()?;
+            [depth, 0.0, milliseconds(shaded)]
+        }
+    };
+    let [depth, filter] = if drawn.is_empty() { [0.0; 2] } else { [depth, filter] };
+    let is_prefiltered = matches!(renderer.shadows().options().filter, Filter::Prefiltered(_));
+    let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
+    let bytes = renderer.shadows().lookup_bytes();
+    Ok(Costs { bytes, depth, filter, shade, drawn: Some(drawn) })
+}
+
+fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Result<Costs, Error> {
+    let start = Instant::now();
+    let reference = Reference::render(tracer, plan, &|_| {})?;
+    let depth = milliseconds(start);
+    let shaded = Instant::now();
+    for range in view.bands() {
+        Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
+    }
+    let bytes = reference.bytes();
+    Ok(Costs { bytes, depth, filter: None, shade: milliseconds(shaded), drawn: None })
+}

@@ -1,0 +1,37 @@
+//! What need not be drawn into a map.
+
+use serde::Serialize;
+use umbrage::{Aabb, Plan, ShadowMap};
+use umbrage_scene::Scene;
+
+/// Triangles of instances whose boxes may cast into a map, and of the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct MapCasters {
+    /// Those that may cast.
+    pub drawn: u64,
+    /// Those that cannot.
+    pub culled: u64,
+}
+
+/// For each of a plan's maps, what may cast into it.
+pub fn casters(plan: &Plan, scene: &Scene) -> Vec<MapCasters> {
+    let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
+    let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
+    let of_map = |map: &ShadowMap| {
+        instances.iter().fold(MapCasters::default(), |mut sum, &(aabb, triangles)| {
+            *(if map.may_cast(aabb) { &mut sum.drawn } else { &mut sum.culled }) += triangles;
+            sum
+        })
+    };
+    plan.maps.iter().map(of_map).collect()
+}
+
+/// Share of all triangles that are culled, 0 to 1, the mean over maps that are not empty; `None` if
+/// all are. `casters` has an entry for each map.
+pub fn casters_culled(plan: &Plan, casters: &[MapCasters]) -> Option<f64> {
+    let casters = plan.maps.iter().zip(casters);
+    let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);
+    let [drawn, culled] =
+        of_full.fold([0, 0], |[d, c], casters| [d + casters.drawn, c + casters.culled]);
+    (drawn + culled > 0).then(|| culled as f64 / (drawn + culled) as f64)
+}

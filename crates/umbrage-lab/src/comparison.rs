@@ -1,0 +1,337 @@
+//! One view's comparison: techniques against ray-traced truth, as pictures, figures and a page in a
+//! folder.
+
+use crate::casters::{casters, casters_culled};
+use crate::error::{About, Error, Field};
+use crate::executor::Executor;
+use crate::light::{ChosenLight, LightOptions, choose_light};
+use crate::motion::{Motion, MovingView, flicker, noise};
+use crate::picture::{Shadowed, Texels};
+use crate::planning::{self, milliseconds};
+use crate::prepared::PreparedScene;
+use crate::progress::Progress;
+use crate::strip::Rows;
+use crate::technique::NamedTechnique;
+use crate::view::{ChosenView, ViewOptions, choose_view};
+use rayon::prelude::*;
+use std::path::Path;
+use std::time::Instant;
+use umbrage::{Plan, ShadowMap};
+use umbrage_measure::{
+    ErrorScale, Image, Measured, Page, Pictures, Report, Rgb, Seen, SeenTruth, Times, Truth,
+    measure, measure_error_px, partition_map, texel_map, write_pictures, write_report,
+    write_truth_pictures,
+};
+use umbrage_scene::Scene;
+use umbrage_trace::View;
+
+/// What to compare with the truth, and how finely.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ComparisonOptions {
+    /// The techniques, all different.
+    pub techniques: Vec<NamedTechnique>,
+    /// Rays along each side of a pixel, 1 to 64. Renderers shade at pixel centres only, as 1 does.
+    pub samples: u32,
+}
+
+/// What to compare in which view, planned.
+pub struct Comparison<'a> {
+    prepared: &'a PreparedScene<'a>,
+    options: &'a ComparisonOptions,
+    chosen_view: ChosenView,
+    chosen_light: ChosenLight,
+    view: View<'a>,
+    /// One a technique, and how long planning took, milliseconds.
+    plans: Vec<(Plan, f64)>,
+}
+
+/// A comparison whose rays are all cast; what is left is to measure and to write.
+pub struct Compared<'a> {
+    comparison: &'a Comparison<'a>,
+    truth: TruthSoFar,
+    contenders: Vec<Contender<'a>>,
+    motion: Option<umbrage_measure::Motion>,
+}
+
+/// A technique at work: its maps, and the picture so far.
+struct Contender<'a> {
+    technique: &'a NamedTechnique,
+    plan: &'a Plan,
+    executor: Executor<'a>,
+    flicker: Option<f64>,
+    noise: Option<f64>,
+    ms: Times,
+    shadowed: Shadowed,
+    texels: Texels,
+}
+
+/// The truth's picture so far.
+#[derive(Default)]
+struct TruthSoFar {
+    shadowed: Shadowed,
+    counted: Vec<bool>,
+    seconds: f64,
+}
+
+/// What shadows look like, done.
+struct Picture {
+    color: Image<Rgb>,
+    visibility: Image<f32>,
+}
+
+impl<'a> Comparison<'a> {
+    /// Plans every technique for this view and light.
+    ///
+    /// # Errors
+    /// A camera or light that the scene does not have, a view that no camera can have, a number of
+    /// rays out of range, and what the planner refuses.
+    pub fn new(
+        prepared: &'a PreparedScene<'a>,
+        view: &ViewOptions,
+        light: &LightOptions,
+        options: &'a ComparisonOptions,
+    ) -> Result<Self, Error> {
+        let chosen_view = choose_view(view, Some(prepared.scene))?;
+        let chosen_light = choose_light(light, Some(prepared.scene))?;
+        let (camera, light) = (chosen_view.camera, chosen_light.light);
+        let view = View::new(prepared.render.tracer(), camera, light, options.samples)
+            .about(Field::Samples)?;
+        let bounds = prepared.receivers.bounds();
+        let plan = |t| planning::plan(t, &camera, &light, &bounds);
+        let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
+    }
+
+    /// That all frames of a motion exist.
+    ///
+    /// # Errors
+    /// A frame's view that no camera can have, or a light that cannot turn.
+    pub fn check_motion(&self, motion: Motion, frames: u32) -> Result<(), Error> {
+        motion.check(frames, self.chosen_view.look_at, self.chosen_light.light)
+    }
+
+    fn height(&self) -> u64 {
+        u64::from(self.chosen_view.camera.image()[1])
+    }
+
+    /// Rows of rays and of measuring that there are to do.
+    pub fn rows(&self) -> u64 {
+        let plans = self.plans.iter().zip(&self.options.techniques);
+        let rows_of_maps: u64 =
+            plans.map(|((plan, _), t)| self.prepared.render.rows(plan, t.technique())).sum();
+        // Of the picture: what is seen, the truth; each technique's lookups and measuring.
+        rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
+    }
+
+    /// Rows that [`Compared::move_on`] adds.
+    pub fn rows_of_motion(&self, motion: Motion, frames: u32) -> u64 {
+        let passes = if motion == Motion::Away { 2 } else { 1 };
+        passes * u64::from(frames) * self.height()
+    }
+
+    /// Renders the maps, and traces the truth and every technique's picture.
+    ///
+    /// # Errors
+    /// What a GPU refuses, or maps that do not fit into memory.
+    pub fn trace(&self, progress: &dyn Progress) -> Result<Compared<'_>, Error> {
+        let mut contenders = Vec::new();
+        for (technique, (plan, ms)) in self.options.techniques.iter().zip(&self.plans) {
+            progress.stage(&format!("{technique}: shadow map"));
+            let mut executor = self.prepared.render.executor(technique.technique())?;
+            let start = Instant::now();
+            let filter = executor.render(plan, &|rows| progress.advance(rows))?;
+            let depth = milliseconds(start) - filter.unwrap_or(0.0);
+            contenders.push(Contender {
+                technique,
+                plan,
+                executor,
+                flicker: None,
+                noise: None,
+                ms: Times { plan: Some(*ms), depth: Some(depth), filter, shade: None },
+                shadowed: Shadowed::default(),
+                texels: Texels::default(),
+            });
+        }
+        let truth = trace(&self.view, &mut contenders, progress)?;
+        Ok(Compared { comparison: self, truth, contenders, motion: None })
+    }
+}
+
+impl Compared<'_> {
+    /// Whether the shadow in any pixel [counts](View::counts).
+    pub fn has_shadows(&self) -> bool {
+        self.truth.counted.contains(&true)
+    }
+
+    /// Measures how much every technique flickers in a motion of so many frames, and how much it
+    /// sparkles on the way away.
+    ///
+    /// # Errors
+    /// Frames that do not exist, and what the planner or a GPU refuses.
+    pub fn move_on(
+        &mut self,
+        motion: Motion,
+        frames: u32,
+        progress: &dyn Progress,
+    ) -> Result<(), Error> {
+        let Comparison { prepared, options, chosen_view, chosen_light, .. } = self.comparison;
+        let moving = MovingView {
+            scene: &prepared.render,
+            bounds: &prepared.receivers.bounds(),
+            look_at: chosen_view.look_at,
+            light: chosen_light.light,
+            samples: options.samples,
+        };
+        let flicker = flicker(motion, frames, &moving, &options.techniques, progress)?;
+        for (contender, flicker) in self.contenders.iter_mut().zip(flicker) {
+            contender.flicker = flicker;
+        }
+        if motion == Motion::Away {
+            let noise = noise(motion, frames, &moving, &options.techniques, progress)?;
+            for (contender, noise) in self.contenders.iter_mut().zip(noise) {
+                contender.noise = noise.mean;
+            }
+        }
+        self.motion = Some(umbrage_measure::Motion { kind: motion.name().to_owned(), frames });
+        Ok(())
+    }
+
+    /// Measures, and writes `index.html`, `report.json` and the pictures into an empty `folder`.
+    /// `command` is what makes the report again, for people to copy.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write(
+        self,
+        folder: &Path,
+        command: &str,
+        progress: &dyn Progress,
+    ) -> Result<Report, Error> {
+        progress.stage("measuring");
+        let Comparison { prepared, options, chosen_view, chosen_light, .. } = self.comparison;
+        let size = chosen_view.camera.image();
+        let seconds = Some(self.truth.seconds);
+        let counted = Image::new(size, self.truth.counted)?;
+        let truth = Picture::new(size, self.truth.shadowed)?;
+        let seen =
+            SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
+        let truth_pictures = write_truth_pictures(folder, &seen)?;
+        let finished = self.contenders.into_par_iter().enumerate().map(|(i, contender)| {
+            let device = prepared.executors.device();
+            let finished = contender.finish(i + 1, folder, &seen, prepared.scene, device);
+            progress.advance(self.comparison.height());
+            finished
+        });
+        let (results, pictures): (_, Vec<Pictures>) =
+            finished.collect::<Result<Vec<_>, Error>>()?.into_iter().unzip();
+        let report = Report {
+            scene: prepared.scene.name.clone(),
+            size,
+            view: chosen_view.info(),
+            light: chosen_light.info(),
+            truth: Truth { rays_per_pixel: options.samples.pow(2), seconds },
+            motion: self.motion,
+            results,
+        };
+        write_report(
+            folder,
+            &Page {
+                report: &report,
+                truth: &truth_pictures,
+                pictures: &pictures,
+                scale: ErrorScale::default(),
+                notices: &prepared.notices(),
+                command: Some(command),
+            },
+        )?;
+        Ok(report)
+    }
+}
+
+/// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that all
+/// share what the camera sees.
+fn trace(
+    view: &View<'_>,
+    contenders: &mut [Contender<'_>],
+    progress: &dyn Progress,
+) -> Result<TruthSoFar, Error> {
+    let advance = |rows| progress.advance(rows);
+    let mut truth = TruthSoFar::default();
+    for range in view.bands() {
+        progress.stage("ray-traced truth");
+        let start = Instant::now();
+        let rows = Rows::new(view, range.clone(), &advance);
+        let strip = rows.truth();
+        truth.seconds += start.elapsed().as_secs_f64();
+        truth.counted.extend(strip.counted());
+        truth.shadowed.push(&strip);
+        for contender in contenders.iter_mut() {
+            progress.stage(&format!("{}: picture", contender.technique));
+            let start = Instant::now();
+            let strip = contender.executor.strip(&rows)?;
+            *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
+            contender.shadowed.push(&strip);
+            contender.texels.push(&strip);
+        }
+    }
+    Ok(truth)
+}
+
+impl Contender<'_> {
+    /// Measures the technique and writes its pictures into `folder`.
+    fn finish(
+        self,
+        index: usize,
+        folder: &Path,
+        truth: &SeenTruth<'_>,
+        scene: &Scene,
+        device: Option<String>,
+    ) -> Result<(Measured, Pictures), Error> {
+        let size = truth.visibility.size();
+        let picture = Picture::new(size, self.shadowed)?;
+        let error_px = Image::new(size, self.texels.error)?;
+        let texels = texel_map(&Image::new(size, self.texels.texel)?, &picture.color)?;
+        // Where one map serves all there is nothing to tell apart.
+        let partition = if self.plan.maps.iter().filter(|m| !ShadowMap::is_empty(m)).count() > 1 {
+            Some(partition_map(&Image::new(size, self.texels.map)?, &picture.color)?)
+        } else {
+            None
+        };
+        let shadows = self.technique.to_string();
+        let seen = Seen {
+            color: &picture.color,
+            visibility: &picture.visibility,
+            error_px: &error_px,
+            partition: partition.as_ref(),
+            texels: Some(&texels),
+        };
+        let pictures =
+            write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
+        let measured = Measured {
+            shadows,
+            technique: Some(self.technique.technique().to_string()),
+            backend: self.executor.name().into(),
+            device: device.filter(|_| self.executor.is_gpu()),
+            maps: self.plan.maps.len() as u32,
+            texels: self.plan.texels(),
+            bytes: Some(self.executor.bytes()),
+            metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
+            error_px: measure_error_px(&error_px, truth.counted)?,
+            storage_factor: Some(self.plan.storage_factor()),
+            casters_culled: casters_culled(self.plan, &casters(self.plan, scene)),
+            flicker: self.flicker,
+            noise: self.noise,
+            ms: self.ms,
+        };
+        Ok((measured, pictures))
+    }
+}
+
+impl Picture {
+    fn new(size: [u32; 2], pixels: Shadowed) -> Result<Self, Error> {
+        Ok(Self {
+            color: Image::new(size, pixels.color)?,
+            visibility: Image::new(size, pixels.visibility)?,
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! Runs shadow techniques on scenes and measures them against ray-traced truth: in one view, in a
+//! motion, in many views. A program, a window or a page says what it wants in plain structs, is told
+//! of the [`Progress`], and gets figures, pictures and reports.
+//!
+//! ```text
+//! open_scene ──────► PreparedScene ──► Comparison ──► Compared ──► report's folder
+//! Executors ───────►                       ▲
+//! choose_view, choose_light ───────────────┘
+//! NamedTechnique ──► plan ──► Executor ──► Strip ──► Shadowed, Texels, Shape
+//! sweep, join_shares: a Comparison for each view of a file
+//! ```
+//!
+//! - [`ViewOptions`] and [`LightOptions`] are what may be asked for; [`choose_view`] and
+//!   [`choose_light`] fill in what is left open from the scene.
+//! - A [`NamedTechnique`] is a technique and the text that asked for it, by which reports call it.
+//! - [`Executors`] are what there is to render with, a GPU or the reference; a [`RenderScene`] is a
+//!   scene ready for them.
+//! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view, [`sweep()`] in
+//!   many.
+//!
+//! Nothing here prints, parses command lines, or asks about the process. What is wrong is an
+//! [`Error`], which names the [`Field`] that it is about; whoever has other words for the fields says
+//! so ([`Error::in_words`]).
+//!
+//! ```
+//! use std::path::Path;
+//! use umbrage_lab::{
+//!     Backend, Comparison, ComparisonOptions, Executors, Fit, LightOptions, PreparedScene,
+//!     ViewOptions, open_scene,
+//! };
+//!
+//! let options = ComparisonOptions {
+//!     techniques: vec!["uniform@64".parse()?, "lispsm@64".parse()?],
+//!     samples: 1,
+//! };
+//! let view = ViewOptions { size: [48, 27], ..ViewOptions::default() };
+//! let scene = open_scene(Path::new(""), "pole")?;
+//! let executors = Executors::open(Backend::Reference, &options.techniques)?;
+//! let prepared = PreparedScene::new(&scene, &executors, false, Fit::Surfaces)?;
+//! let comparison = Comparison::new(&prepared, &view, &LightOptions::default(), &options)?;
+//! let folder = tempfile::tempdir()?;
+//! // Nobody is told how far it is.
+//! let report = comparison.trace(&())?.write(folder.path(), "an example", &())?;
+//! assert_eq!(report.results[1].shadows, "lispsm@64");
+//! assert!(report.results[0].metrics.wrong_fraction < Some(0.2));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod bencher;
+mod casters;
+mod comparison;
+mod error;
+mod executor;
+mod executors;
+mod folder;
+mod light;
+mod motion;
+mod picture;
+mod planning;
+mod prepared;
+mod progress;
+mod receivers;
+mod scene;
+mod strip;
+mod sweep;
+mod technique;
+pub mod values;
+mod view;
+
+pub use bencher::{Bencher, Costs};
+pub use casters::{MapCasters, casters, casters_culled};
+pub use comparison::{Compared, Comparison, ComparisonOptions};
+pub use error::{Difference, Error, Field};
+pub use executor::{Executor, RenderScene};
+pub use executors::{Backend, Executors};
+pub use folder::{Contents, ReportFolder, check_file};
+pub use light::{ChosenLight, LightOptions, choose_light};
+pub use motion::{Motion, MovingView, Noise, flicker, noise};
+pub use picture::{Shadowed, Shape, Texels};
+pub use planning::{milliseconds, plan, planner};
+pub use prepared::PreparedScene;
+pub use progress::Progress;
+pub use receivers::{Fit, Receivers};
+pub use scene::open_scene;
+pub use strip::{NOTHING_TO_SHADOW, Rows, Strip};
+pub use sweep::{Share, SweepOptions, join_shares, sweep};
+pub use technique::{NamedTechnique, TechniqueError};
+pub use view::{ChosenView, ViewOptions, choose_view};

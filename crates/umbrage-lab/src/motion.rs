@@ -1,0 +1,10 @@
+//! What a motion shows: shadows that change from frame to frame where the truth does not, and pixels
+//! that sparkle as a scene gets smaller.
+
+mod flicker;
+mod frames;
+mod noise;
+
+pub use flicker::flicker;
+pub use frames::{Motion, MovingView};
+pub use noise::{Noise, noise};

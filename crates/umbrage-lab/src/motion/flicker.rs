@@ -1,0 +1,64 @@
+//! Shadows that change from frame to frame where the truth does not.
+
+use super::frames::{Frame, Motion, MovingView, executors};
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::technique::NamedTechnique;
+use umbrage_trace::{Sample, View};
+
+/// How much every technique's shadows change, from frame to frame, where the truth does not: the mean
+/// change of visibility, which for hard shadows is the share of points that change. `progress` hears of
+/// as many rows a frame as its picture has.
+///
+/// What a pixel shows is followed back into the frame before, where it must have been seen as well, and
+/// the truth and the technique are asked there again. So only shadows count that change on a point of a
+/// surface, and not what appears, vanishes or moves across the picture. Compared are points that face
+/// the light in both frames; `None` if there are none.
+///
+/// # Errors
+/// Frames that do not exist, and what the planner or a GPU refuses.
+pub fn flicker(
+    motion: Motion,
+    frames: u32,
+    moving: &MovingView<'_>,
+    techniques: &[NamedTechnique],
+    progress: &dyn Progress,
+) -> Result<Vec<Option<f64>>, Error> {
+    let MovingView { scene, look_at, samples, .. } = *moving;
+    let frames = Frame::all(motion, frames, moving, samples, techniques)?;
+    let mut change = vec![0f64; techniques.len()];
+    let mut compared = 0u64;
+    let [mut now, mut last] = [executors(scene, techniques)?, executors(scene, techniques)?];
+    let mut before: Option<&View<'_>> = None;
+    for (i, frame) in frames.iter().enumerate() {
+        progress.stage(&format!("motion: frame {} of {}", i + 1, frames.len()));
+        for (executor, plan) in now.iter_mut().zip(&frame.plans) {
+            executor.render(plan, &|_| {})?;
+        }
+        let bands = before.into_iter().flat_map(|last| frame.view.bands().map(move |b| (last, b)));
+        for (last_view, rows) in bands {
+            let band = frame.view.band(rows, &|_| {});
+            let steady = band.map(|s| steady(s, &frame.view, last_view), &|_| {});
+            let steady: Vec<[Sample; 2]> = steady.into_iter().flatten().collect();
+            compared += steady.len() as u64;
+            let [is, was] = [0, 1].map(|i| steady.iter().map(|s| &s[i]).collect::<Vec<_>>());
+            for ((change, now), last) in change.iter_mut().zip(&mut now).zip(&mut last) {
+                let [is, was] = [now.visibility(&is)?, last.visibility(&was)?];
+                *change += is.iter().zip(was).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
+            }
+        }
+        progress.advance(u64::from(look_at.image[1]));
+        before = Some(&frame.view);
+        std::mem::swap(&mut now, &mut last);
+    }
+    Ok(change.iter().map(|sum| (compared > 0).then(|| sum / compared as f64)).collect())
+}
+
+/// A sample as it is and as it was in the frame before, if it counts in both and the truth about it has
+/// not changed.
+fn steady(sample: &Sample, view: &View<'_>, last: &View<'_>) -> Option<[Sample; 2]> {
+    let was = last.sees(&sample.surface)?;
+    let both_count =
+        view.counts(sample.is_facing, sample.depth) && last.counts(was.is_facing, was.depth);
+    (both_count && view.truth(sample) == last.truth(&was)).then_some([*sample, was])
+}

@@ -1,0 +1,126 @@
+//! Motions, frame by frame.
+
+use crate::error::{About, Error, Field};
+use crate::executor::{Executor, RenderScene};
+use crate::planning;
+use crate::technique::NamedTechnique;
+use glam::{DQuat, DVec3};
+use umbrage::{Bounds, Camera, Light, LookAt, Plan};
+use umbrage_trace::View;
+
+/// A motion, in steps as small as between the frames of a film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// The viewer moves forward, by a hundredth of the distance to the target a frame.
+    Dolly,
+    /// The viewer circles the target, half a degree a frame.
+    Orbit,
+    /// The light turns about the vertical, a tenth of a degree a frame.
+    Sun,
+    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that more
+    /// and more texels fall into a pixel.
+    Away,
+}
+
+/// What moves, through what.
+#[derive(Clone, Copy)]
+pub struct MovingView<'a> {
+    /// Where it is rendered.
+    pub scene: &'a RenderScene<'a>,
+    /// Where the scene's shadows fall.
+    pub bounds: &'a Bounds<'a>,
+    /// The view of the first frame.
+    pub look_at: LookAt,
+    /// Its light.
+    pub light: Light,
+    /// Rays along each side of a pixel, 1 to 64.
+    pub samples: u32,
+}
+
+impl Motion {
+    /// One word: `dolly`, `orbit`, `sun` or `away`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dolly => "dolly",
+            Self::Orbit => "orbit",
+            Self::Sun => "sun",
+            Self::Away => "away",
+        }
+    }
+
+    /// That all frames of the motion exist.
+    ///
+    /// # Errors
+    /// A frame's view that no camera can have, or a light that cannot turn.
+    pub fn check(self, frames: u32, look_at: LookAt, light: Light) -> Result<(), Error> {
+        (0..frames).try_for_each(|i| self.frame(look_at, light, i).map(drop))
+    }
+
+    /// View and light of a frame; the first is as told.
+    fn frame(self, look_at: LookAt, light: Light, index: u32) -> Result<(Camera, Light), Error> {
+        let index = f64::from(index);
+        let mut frame = (look_at, light);
+        match self {
+            Self::Dolly => {
+                let step = (look_at.target - look_at.eye) * (0.01 * index);
+                frame.0.eye += step;
+                frame.0.target += step;
+            }
+            Self::Orbit => {
+                let axis = look_at.up.normalize_or(DVec3::Y);
+                let turn = DQuat::from_axis_angle(axis, (0.5 * index).to_radians());
+                frame.0.eye = look_at.target + turn * (look_at.eye - look_at.target);
+            }
+            Self::Away => frame.0.eye += (look_at.eye - look_at.target) * (0.005 * index),
+            Self::Sun => {
+                let turn = DQuat::from_rotation_y((0.1 * index).to_radians());
+                match &mut frame.1 {
+                    Light::Directional { direction } => *direction = turn * *direction,
+                    Light::Spot(spot) => spot.direction = turn * spot.direction,
+                    Light::Point(_) => {
+                        let problem =
+                            "a point light has no direction to turn: take dolly, orbit or away";
+                        return Err(Error::field(Field::Motion, problem));
+                    }
+                }
+            }
+        }
+        let camera = Camera::look_at(frame.0).about(Field::Motion)?;
+        Ok((camera, frame.1))
+    }
+}
+
+/// A frame's view, and every technique's plan for it.
+pub(super) struct Frame<'a> {
+    pub(super) view: View<'a>,
+    pub(super) plans: Vec<Plan>,
+}
+
+impl<'a> Frame<'a> {
+    /// All frames of a motion, pixels having so many rays along each side.
+    pub(super) fn all(
+        motion: Motion,
+        frames: u32,
+        moving: &MovingView<'a>,
+        samples: u32,
+        techniques: &[NamedTechnique],
+    ) -> Result<Vec<Self>, Error> {
+        let MovingView { scene, bounds, look_at, light, .. } = *moving;
+        let frame = |i| {
+            let (camera, light) = motion.frame(look_at, light, i)?;
+            let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
+            let plan = |t| planning::plan(t, &camera, &light, bounds).map(|(plan, _)| plan);
+            let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
+            Ok(Self { view, plans })
+        };
+        (0..frames).map(frame).collect()
+    }
+}
+
+/// Who renders each technique.
+pub(super) fn executors<'a>(
+    scene: &'a RenderScene<'_>,
+    techniques: &[NamedTechnique],
+) -> Result<Vec<Executor<'a>>, Error> {
+    techniques.iter().map(|t| scene.executor(t.technique())).collect()
+}

@@ -1,0 +1,139 @@
+//! Pixels that sparkle as a scene gets smaller.
+
+use super::frames::{Frame, Motion, MovingView, executors};
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::technique::NamedTechnique;
+use std::ops::Range;
+use umbrage_trace::{Sample, View};
+
+/// Rays along each side of a pixel that tell what it ought to show.
+const TRUTH_SAMPLES: u32 = 8;
+
+/// Cosine of the angle up to which surfaces count as one.
+const SAME_PLANE: f64 = 0.99;
+
+/// How much a technique's pixels sparkle.
+#[derive(Clone, Debug)]
+pub struct Noise {
+    /// Of each pixel, the mean over the frames; NaN where it never counts twice in a row.
+    pub pixels: Vec<f32>,
+    /// Over all pixels; `None` if none counts.
+    pub mean: Option<f64>,
+}
+
+/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at its
+/// centre being compared with the mean of 64 true ones all over it. What is wrong but steady, as a blur
+/// is, does not count. A pixel counts where surfaces that face the light fill it in both frames.
+/// `progress` hears of as many rows a frame as its picture has.
+///
+/// # Errors
+/// Frames that do not exist, and what the planner or a GPU refuses.
+pub fn noise(
+    motion: Motion,
+    frames: u32,
+    moving: &MovingView<'_>,
+    techniques: &[NamedTechnique],
+    progress: &dyn Progress,
+) -> Result<Vec<Noise>, Error> {
+    let MovingView { scene, look_at, .. } = *moving;
+    let all = Frame::all(motion, frames, moving, TRUTH_SAMPLES, techniques)?;
+    let mut executors = executors(scene, techniques)?;
+    let count = look_at.image.map(|n| n as usize).iter().product();
+    let mut trails: Vec<Trail> = techniques.iter().map(|_| Trail::new(count)).collect();
+    for (i, Frame { view, plans }) in all.iter().enumerate() {
+        progress.stage(&format!("noise: frame {} of {}", i + 1, all.len()));
+        for (executor, plan) in executors.iter_mut().zip(plans) {
+            executor.render(plan, &|_| {})?;
+        }
+        let centers = View::new(scene.tracer(), *view.camera(), *view.light(), 1)?;
+        for rows in view.bands() {
+            let ideal = ideal(view, &centers, rows, &|n| progress.advance(n));
+            let samples: Vec<&Sample> = ideal.iter().map(|pixel| &pixel.sample).collect();
+            for (executor, trail) in executors.iter_mut().zip(&mut trails) {
+                let visibility = executor.visibility(&samples)?;
+                for (pixel, visibility) in ideal.iter().zip(visibility) {
+                    trail.now[pixel.index] = visibility - pixel.truth;
+                }
+            }
+        }
+        trails.iter_mut().for_each(Trail::step);
+    }
+    Ok(trails.into_iter().map(Trail::noise).collect())
+}
+
+/// What a pixel ought to show, and what is at its centre.
+struct Ideal {
+    index: usize,
+    truth: f32,
+    sample: Sample,
+}
+
+/// The pixels of some rows that count.
+fn ideal(
+    view: &View<'_>,
+    centers: &View<'_>,
+    rows: Range<u32>,
+    progress: umbrage_trace::Progress<'_>,
+) -> Vec<Ideal> {
+    let counts =
+        |s: &Option<Sample>| s.as_ref().filter(|s| view.counts(s.is_facing, s.depth)).copied();
+    let first = rows.start as usize * view.camera().image()[0] as usize;
+    let band = view.band(rows.clone(), progress);
+    let truth = band.map(|s| view.truth(s), &|_| {});
+    let n = band.samples_per_pixel();
+    let pixels = band.samples().chunks(n).zip(truth.chunks(n));
+    let middles = centers.band(rows, &|_| {});
+    pixels
+        .zip(middles.samples())
+        .enumerate()
+        .filter_map(|(i, ((samples, truth), middle))| {
+            let sample = counts(middle)?;
+            let plane = |s: Sample| s.surface.geometric_normal;
+            let is_full = samples
+                .iter()
+                .all(|s| counts(s).is_some_and(|s| plane(s).dot(plane(sample)) > SAME_PLANE));
+            if !is_full {
+                return None;
+            }
+            let truth = truth.iter().sum::<f32>() / n as f32;
+            Some(Ideal { index: first + i, truth, sample })
+        })
+        .collect()
+}
+
+/// A technique's errors on the way.
+struct Trail {
+    now: Vec<f32>,
+    last: Vec<f32>,
+    /// Sum of the changes, and how many.
+    sums: Vec<(f32, u32)>,
+}
+
+impl Trail {
+    fn new(pixels: usize) -> Self {
+        let none = vec![f32::NAN; pixels];
+        Self { now: none.clone(), last: none, sums: vec![(0.0, 0); pixels] }
+    }
+
+    /// Goes on to the next frame.
+    fn step(&mut self) {
+        for ((now, last), sum) in self.now.iter_mut().zip(&mut self.last).zip(&mut self.sums) {
+            let change = (*now - *last).abs();
+            if !change.is_nan() {
+                *sum = (sum.0 + change, sum.1 + 1);
+            }
+            *last = std::mem::replace(now, f32::NAN);
+        }
+    }
+
+    fn noise(self) -> Noise {
+        let (sum, n) = self.sums.iter().fold((0.0, 0u64), |(sum, n), &(change, count)| {
+            (sum + f64::from(change), n + u64::from(count))
+        });
+        Noise {
+            pixels: self.sums.iter().map(|&(sum, n)| sum / n as f32).collect(),
+            mean: (n > 0).then(|| sum / n as f64),
+        }
+    }
+}

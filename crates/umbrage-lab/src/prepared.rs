@@ -1,0 +1,43 @@
+//! A scene, ready for whatever is to be found out about it.
+
+use crate::error::Error;
+use crate::executor::RenderScene;
+use crate::executors::Executors;
+use crate::receivers::{Fit, Receivers};
+use umbrage_scene::Scene;
+
+/// A scene, ready for comparisons in many views.
+pub struct PreparedScene<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) executors: &'a Executors,
+    pub(crate) render: RenderScene<'a>,
+    pub(crate) receivers: Receivers,
+    opaque: bool,
+}
+
+impl<'a> PreparedScene<'a> {
+    /// `opaque`: alpha-masked materials cast and show as solid.
+    ///
+    /// # Errors
+    /// A scene that refers to what it does not have, or that a GPU does not hold.
+    pub fn new(
+        scene: &'a Scene,
+        executors: &'a Executors,
+        opaque: bool,
+        fit: Fit,
+    ) -> Result<Self, Error> {
+        let render = RenderScene::new(scene, executors, opaque)?;
+        let receivers = Receivers::new(scene, render.tracer(), fit);
+        Ok(Self { scene, executors, render, receivers, opaque })
+    }
+
+    /// What readers of a report should know.
+    pub(crate) fn notices(&self) -> Vec<String> {
+        let mut notices: Vec<String> = self.scene.notices.iter().map(|n| n.0.clone()).collect();
+        if self.opaque {
+            notices
+                .push("Alpha masks are ignored: masked materials show and cast as solid.".into());
+        }
+        notices
+    }
+}

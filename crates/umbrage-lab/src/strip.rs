@@ -1,0 +1,207 @@
+//! What some rows of a picture show, a value a sample, whoever found it.
+
+use glam::Vec3;
+use std::cell::OnceCell;
+use std::ops::Range;
+use umbrage::{Camera, Plan};
+use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
+
+/// What to say of a picture none of whose pixels counts.
+pub const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
+     the view's range: there are no shadows to see";
+
+/// Some of a picture's rows, and what the CPU sees there, which is found when it is first asked for.
+pub struct Rows<'a> {
+    view: &'a View<'a>,
+    range: Range<u32>,
+    progress: Progress<'a>,
+    band: OnceCell<Band>,
+}
+
+impl<'a> Rows<'a> {
+    /// Rows of a view's picture, counted from the top. `progress` is told of rows of rays.
+    pub fn new(view: &'a View<'a>, range: Range<u32>, progress: Progress<'a>) -> Self {
+        Self { view, range, progress, band: OnceCell::new() }
+    }
+
+    /// Whose picture it is.
+    pub(crate) fn view(&self) -> &'a View<'a> {
+        self.view
+    }
+
+    /// Which rows these are.
+    pub(crate) fn range(&self) -> Range<u32> {
+        self.range.clone()
+    }
+
+    /// The surfaces that rays find.
+    fn band(&self) -> &Band {
+        self.band.get_or_init(|| self.view.band(self.range.clone(), self.progress))
+    }
+
+    /// The truth.
+    pub fn truth(&self) -> Strip {
+        let band = self.band();
+        Strip::new(self.view, band, band.map(|s| self.view.truth(s), self.progress))
+    }
+
+    /// Nothing casts.
+    pub fn in_full_light(&self) -> Strip {
+        let band = self.band();
+        Strip::new(self.view, band, vec![1.0; band.samples().len()])
+    }
+
+    /// What the reference's maps of a plan let through.
+    pub fn by_reference(&self, plan: &Plan, reference: &Reference<'_>) -> Strip {
+        let band = self.band();
+        let visibility = band.map(|s| reference.visibility(0, s), self.progress);
+        let lookup = |s: &Sample| Lookup::of(plan, reference, self.view.camera(), s);
+        Strip { lookups: band.map(lookup, &|_| {}), ..Strip::new(self.view, band, visibility) }
+    }
+}
+
+/// What some rows of a picture show, a value a sample, whoever found it: pixel after pixel.
+pub struct Strip {
+    pub(crate) samples_per_pixel: usize,
+    /// Linear colour.
+    pub(crate) radiance: Vec<Vec3>,
+    /// 1 in the sky.
+    pub(crate) visibility: Vec<f32>,
+    /// Whether a surface is seen whose shadow [counts](View::counts).
+    counts: Vec<bool>,
+    /// Metres; infinite in the sky.
+    pub(crate) depth: Vec<f32>,
+    /// World space; zero in the sky.
+    pub(crate) normal: Vec<Vec3>,
+    /// Empty for the truth, which has no maps.
+    pub(crate) lookups: Vec<Lookup>,
+}
+
+/// What a plan has for a sample.
+#[derive(Clone, Copy)]
+pub(crate) struct Lookup {
+    /// Pixels per texel in the worst direction; NaN without a map.
+    pub(crate) error: f32,
+    /// Coordinates in the map; NaN without one.
+    pub(crate) texel: [f32; 2],
+    /// Index of the map that serves the sample.
+    pub(crate) map: Option<u16>,
+}
+
+impl Default for Lookup {
+    fn default() -> Self {
+        Self { error: f32::NAN, texel: [f32::NAN; 2], map: None }
+    }
+}
+
+impl Lookup {
+    fn of(plan: &Plan, reference: &Reference<'_>, camera: &Camera, sample: &Sample) -> Self {
+        let surface = &sample.surface;
+        let Some(place) = reference.texel(0, surface.position) else {
+            return Self::default();
+        };
+        let error =
+            plan.maps[place.map].surface_error(camera, surface.position, surface.geometric_normal);
+        Self {
+            error: error.map_or(f32::NAN, |e| e.worst as f32),
+            texel: place.texel.as_vec2().to_array(),
+            map: u16::try_from(place.map).ok(),
+        }
+    }
+}
+
+impl Strip {
+    fn new(view: &View<'_>, band: &Band, visibility: Vec<f32>) -> Self {
+        let samples = || band.samples().iter().map(Option::as_ref);
+        let counts = |s: &Sample| view.counts(s.is_facing, s.depth);
+        Self {
+            samples_per_pixel: band.samples_per_pixel(),
+            radiance: shade::radiances(view, band, &visibility),
+            counts: samples().map(|s| s.is_some_and(counts)).collect(),
+            depth: samples().map(|s| s.map_or(f32::INFINITY, |s| s.depth as f32)).collect(),
+            normal: samples()
+                .map(|s| s.map_or(Vec3::ZERO, |s| s.surface.shading_normal.as_vec3()))
+                .collect(),
+            visibility: samples().zip(visibility).map(|(s, v)| s.map_or(1.0, |_| v)).collect(),
+            lookups: Vec::new(),
+        }
+    }
+
+    /// What a GPU drew.
+    pub(crate) fn of_gpu(samples: &[umbrage_render::Sample], view: &View<'_>) -> Self {
+        type Drawn = umbrage_render::Sample;
+        let counts = |s: &Drawn| view.counts(s.is_facing, s.depth.into());
+        let lookup = |s: &Drawn| Lookup {
+            error: s.error,
+            texel: s.texel.to_array(),
+            map: s.map.and_then(|m| u16::try_from(m).ok()),
+        };
+        Self {
+            samples_per_pixel: view.grid().pow(2) as usize,
+            radiance: samples.iter().map(|s| s.radiance).collect(),
+            visibility: samples.iter().map(|s| s.visibility).collect(),
+            counts: samples.iter().map(counts).collect(),
+            depth: samples.iter().map(|s| s.depth).collect(),
+            normal: samples.iter().map(|s| s.normal).collect(),
+            lookups: samples.iter().map(lookup).collect(),
+        }
+    }
+
+    /// For each pixel the mean of a value over the samples that count; `None` where none does.
+    pub(crate) fn means(&self, value: impl Fn(usize) -> f32) -> impl Iterator<Item = Option<f32>> {
+        let n = self.samples_per_pixel;
+        self.counts.chunks(n).enumerate().map(move |(pixel, counts)| {
+            let counted = counts.iter().enumerate().filter(|(_, counts)| **counts);
+            let values = counted.map(|(i, _)| value(pixel * n + i));
+            let (sum, count) = values.fold((0.0, 0u32), |(sum, n), v| (sum + v, n + 1));
+            (count > 0).then(|| sum / count as f32)
+        })
+    }
+
+    /// Whether each pixel counts: any of its samples does.
+    pub fn counted(&self) -> impl Iterator<Item = bool> {
+        self.counts.chunks(self.samples_per_pixel).map(|counts| counts.contains(&true))
+    }
+
+    /// A value of the sample in the middle of each pixel, or next to it.
+    pub(crate) fn middles<'a, T>(&self, values: &'a [T]) -> impl Iterator<Item = &'a T> {
+        let grid = self.samples_per_pixel.isqrt();
+        let middle = grid / 2 * grid + grid / 2;
+        values.iter().skip(middle).step_by(self.samples_per_pixel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use umbrage::{Light, LookAt};
+    use umbrage_trace::Tracer;
+
+    #[test]
+    fn pixels_average_their_counted_samples() {
+        let scene = umbrage_scene::builtin("sphere", Some(32)).unwrap();
+        let tracer = Tracer::new(&scene).unwrap();
+        let light = Light::Directional { direction: DVec3::new(1.0, -1.25, 0.4) };
+        let means = |far| {
+            let look_at = LookAt {
+                eye: DVec3::new(-2.5, 3.4, 7.5),
+                target: DVec3::Y,
+                up: DVec3::Y,
+                fov_y_rad: std::f64::consts::FRAC_PI_3,
+                near: 1e-5,
+                far,
+                image: [90, 60],
+            };
+            let view = View::new(&tracer, Camera::look_at(look_at).unwrap(), light, 4).unwrap();
+            let strip = Rows::new(&view, 0..60, &|_| {}).truth();
+            strip.means(|i| strip.visibility[i]).collect::<Vec<_>>()
+        };
+        let all = means(1e4);
+        assert_eq!(all.len(), 90 * 60);
+        assert!(all.iter().any(Option::is_none), "sky");
+        let partial = all.iter().flatten().filter(|&&v| v > 0.0 && v < 1.0).count();
+        assert!((20..500).contains(&partial), "{partial} pixels on the outline");
+        assert!(means(0.1).iter().all(Option::is_none), "all beyond 10 cm");
+    }
+}

@@ -1,0 +1,250 @@
+//! The folder of a sweep. It survives being stopped at any moment.
+//!
+//! ```text
+//! sweep.json          what all views have in common; the first file, so it tells a sweep's folder
+//! .lock               held while a process is at work
+//! views/NAME/         a view's report and `view.json`, which says what it was made from
+//! results.csv, results.json, index.html
+//! ```
+//!
+//! A view's folder comes into being by a rename, whole. What was being made when a process died is left
+//! under a name that begins with `.umbrage-`; the next process clears it away.
+
+use super::views::SweepView;
+use crate::error::{About, Difference, Error, Field};
+use crate::folder::{Contents, ReportFolder, TEMPORARY, VIEW_RECORD, existing_parent, names_in};
+use serde::{Deserialize, Serialize};
+use std::fs::{File, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use umbrage_measure::{Report, SweepSettings, write_file};
+
+/// Figures of another version are no figures of this one.
+pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+const SETTINGS: &str = "sweep.json";
+const LOCK: &str = ".lock";
+const VIEWS: &str = "views";
+const TABLES: [&str; 3] = ["index.html", "results.json", "results.csv"];
+
+/// All that a view's figures depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Inputs {
+    /// The program's.
+    pub(super) version: String,
+    /// Of all views.
+    pub(super) settings: SweepSettings,
+    /// The view itself.
+    pub(super) view: SweepView,
+    /// Of the scene's files together; `None` for one that is built in or not there.
+    pub(super) scene_sha256: Option<String>,
+}
+
+/// `view.json`.
+#[derive(Serialize, Deserialize)]
+struct Record {
+    inputs: Inputs,
+    /// Why there is no report.
+    error: Option<String>,
+}
+
+/// What is there of a view.
+pub(super) struct Stored {
+    pub(super) inputs: Inputs,
+    /// Its report, or why there is none.
+    pub(super) outcome: Result<Report, String>,
+}
+
+/// The folder of a sweep that nobody else works in.
+pub(super) struct SweepFolder {
+    path: PathBuf,
+    /// Unlocks when closed, however the process ends.
+    _lock: File,
+}
+
+impl SweepFolder {
+    /// Begins a sweep in a new or empty folder, or goes on with one of the same settings.
+    ///
+    /// # Errors
+    /// A folder that holds something else or another sweep, in which another process is at work, or
+    /// that cannot be written.
+    pub(super) fn open(path: &Path, settings: &SweepSettings) -> Result<Self, Error> {
+        let wrong = |problem: String| Err(Error::field(Field::Output, problem));
+        let shown = path.display();
+        existing_parent(path)?;
+        match std::fs::create_dir(path) {
+            Err(e) if e.kind() != ErrorKind::AlreadyExists => {
+                return wrong(format!("cannot make {shown}: {e}"));
+            }
+            _ if !path.is_dir() => {
+                return wrong(format!("{shown} is there and is not a folder"));
+            }
+            _ => {}
+        }
+        let names =
+            names_in(path).about_trying(Field::Output, || format!("cannot read {shown}"))?;
+        let is_ours = |name: &String| name == LOCK || name.starts_with(TEMPORARY);
+        if !names.iter().any(|n| n == SETTINGS) && !names.iter().all(is_ours) {
+            return wrong(format!(
+                "{shown} holds something other than a sweep; take another folder or empty it"
+            ));
+        }
+        let lock = lock(path)?;
+        if let Some(present) = read_settings(path, Field::Output)? {
+            check_same(path, Field::Output, &present, settings)?;
+        }
+        begin(path, settings).about_trying(Field::Output, || format!("cannot write in {shown}"))?;
+        Ok(Self { path: path.to_owned(), _lock: lock })
+    }
+
+    /// Names of the views that are there.
+    pub(super) fn names(&self) -> Result<Vec<String>, Error> {
+        names_in(&self.path.join(VIEWS)).about(Field::Output)
+    }
+
+    /// What is there of a view; `None` if nothing whole is.
+    pub(super) fn stored(&self, name: &str) -> Option<Stored> {
+        stored(&self.path, name)
+    }
+
+    /// Removes the tables, which are about to be out of date.
+    pub(super) fn remove_tables(&self) -> Result<(), Error> {
+        for table in TABLES {
+            match std::fs::remove_file(self.path.join(table)) {
+                Err(e) if e.kind() != ErrorKind::NotFound => {
+                    let problem = format!("cannot remove {table} in {}: {e}", self.path.display());
+                    return Err(Error::field(Field::Output, problem));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a view's report goes, checked before any work.
+    pub(super) fn place(&self, name: &str) -> Result<ReportFolder, Error> {
+        ReportFolder::check(&view_folder(&self.path, name), Contents::COMPARISON)
+    }
+}
+
+/// Writes what a sweep's folder begins with, in place of what others left unfinished.
+fn begin(path: &Path, settings: &SweepSettings) -> io::Result<()> {
+    clear(path)?;
+    let text = serde_json::to_string_pretty(settings)?;
+    write_file(path.join(SETTINGS), text.as_bytes()).map_err(io::Error::other)?;
+    match std::fs::create_dir(path.join(VIEWS)) {
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => clear(&path.join(VIEWS)),
+        made => made,
+    }
+}
+
+/// Removes what others left unfinished.
+fn clear(folder: &Path) -> io::Result<()> {
+    for name in names_in(folder)?.iter().filter(|n| n.starts_with(TEMPORARY)) {
+        let path = folder.join(name);
+        if path.is_dir() { std::fs::remove_dir_all(path)? } else { std::fs::remove_file(path)? }
+    }
+    Ok(())
+}
+
+/// Puts a view's result in place, whole: `write` fills a folder with its report, unless there is an `error`.
+pub(super) fn put(
+    place: &ReportFolder,
+    inputs: &Inputs,
+    error: Option<String>,
+    write: impl FnOnce(&Path) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let record = Record { inputs: inputs.clone(), error };
+    place.replace(|folder| {
+        write(folder)?;
+        let text = serde_json::to_string_pretty(&record).about(Field::Output)?;
+        Ok(write_file(folder.join(VIEW_RECORD), text.as_bytes())?)
+    })
+}
+
+/// The folder of a view in that of a sweep.
+pub(super) fn view_folder(sweep: &Path, name: &str) -> PathBuf {
+    sweep.join(VIEWS).join(name)
+}
+
+/// The same, as part of an address.
+pub(super) fn relative_view_folder(name: &str) -> String {
+    format!("{VIEWS}/{name}")
+}
+
+/// What a sweep's folder has of a view; `None` if nothing whole is there.
+pub(super) fn stored(sweep: &Path, name: &str) -> Option<Stored> {
+    let folder = view_folder(sweep, name);
+    let read = |file: &str| std::fs::read_to_string(folder.join(file)).ok();
+    let Record { inputs, error } = serde_json::from_str(&read(VIEW_RECORD)?).ok()?;
+    let outcome = match error {
+        Some(error) => Err(error),
+        None if !folder.join("index.html").is_file() => return None,
+        None => Ok(Report::from_json(&read("report.json")?).ok()?.without_times()),
+    };
+    Some(Stored { inputs, outcome })
+}
+
+/// The settings of the sweep in a folder that `field` names; `None` if there is none.
+///
+/// # Errors
+/// Settings that cannot be read.
+pub(super) fn read_settings(sweep: &Path, field: Field) -> Result<Option<SweepSettings>, Error> {
+    let path = sweep.join(SETTINGS);
+    let shown = path.display();
+    let text = match std::fs::read_to_string(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.about_trying(field, || format!("cannot read {shown}"))?,
+    };
+    let settings = serde_json::from_str(&text)
+        .about_trying(field, || format!("{shown} is not the settings of a sweep"))?;
+    Ok(Some(settings))
+}
+
+/// That the settings of a folder that `field` names are those `wanted`.
+pub(super) fn check_same(
+    folder: &Path,
+    field: Field,
+    present: &SweepSettings,
+    wanted: &SweepSettings,
+) -> Result<(), Error> {
+    let values = |s: &SweepSettings| {
+        [
+            (Field::Shadows, s.shadows.join(" ")),
+            (Field::MaxError, s.max_error.map_or("off".to_owned(), |pixels| pixels.to_string())),
+            (Field::Size, format!("{}x{}", s.size[0], s.size[1])),
+            (Field::Samples, s.samples.to_string()),
+            (Field::Fit, s.fit.clone()),
+            (Field::Opaque, if s.opaque { "on" } else { "off" }.to_owned()),
+            (Field::Backend, s.backend.clone()),
+        ]
+    };
+    let pairs = values(present).into_iter().zip(values(wanted));
+    let differences: Vec<Difference> = pairs
+        .filter(|(present, wanted)| present != wanted)
+        .map(|((field, was), (_, is))| Difference { field, was, is })
+        .collect();
+    match differences.is_empty() {
+        true => Ok(()),
+        false => Err(Error::OtherSweep { field, folder: folder.to_owned(), differences }),
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, Error> {
+    let shown = folder.display();
+    let open = File::options().create(true).truncate(false).write(true).open(folder.join(LOCK));
+    let file = open.about_trying(Field::Output, || format!("cannot write in {shown}"))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let problem = format!(
+                "another sweep is at work in {shown}; shares that run at the same time need folders \
+                 of their own"
+            );
+            return Err(Error::field(Field::Output, problem));
+        }
+        // Some network file systems have no locks; whoever starts two there has been told not to.
+        Err(TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
+        locked => locked.about_trying(Field::Output, || format!("cannot lock {shown}"))?,
+    }
+    Ok(file)
+}
