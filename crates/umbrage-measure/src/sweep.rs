@@ -261,6 +261,8 @@ struct ErrorJson<'a> {
 #[derive(Serialize)]
 struct ResultJson<'a> {
     shadows: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    technique: Option<&'a str>,
     backend: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     device: Option<&'a str>,
@@ -280,7 +282,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         // left out.
         let Measured {
             shadows,
-            technique: _,
+            technique,
             backend,
             device,
             maps,
@@ -296,6 +298,7 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
         } = measured;
         Self {
             shadows,
+            technique: technique.as_deref(),
             backend,
             device: device.as_deref(),
             maps: *maps,

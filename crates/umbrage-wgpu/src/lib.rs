@@ -12,6 +12,7 @@
 //!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states,
 //!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the fragment
 //!   stage that the device needs.
+//! - The [`cookbook`] has recipes: casters and shading of your own, several cameras, and others.
 //! - [`Support`] says what a device can do, and documents what takes the place of what it cannot
 //!   do.
 //!
@@ -44,6 +45,9 @@
 //! new [`Shadows`] on the new device.
 
 mod casters;
+// The recipes are compiled and run by the tests in `tests/gpu/cookbook.rs`.
+#[cfg(all(doc, not(doctest)))]
+pub mod cookbook;
 mod data;
 mod error;
 mod passes;

@@ -286,12 +286,12 @@ fn add_statistic(shader: &mut Shader, statistic: &Statistic) {
             shader.add([module!("statistic/msm"), module!("chebyshev")]);
         }
         Statistic::Csm(s) => {
-            let mut amounts: Vec<f32> = s.terms().map(|[_, amount]| amount).collect();
-            amounts.resize(amounts.len().next_multiple_of(2), 0.0);
-            let (pairs, _) = amounts.as_chunks::<2>();
+            let amounts: Vec<f32> = s.terms().map(|[_, amount]| amount).collect();
+            let pair = |pair: &[f32]| [pair[0], pair.get(1).copied().unwrap_or(0.0)];
+            let pairs: Vec<[f32; 2]> = amounts.chunks(2).map(pair).collect();
             let rate = s.terms().next().map_or(0.0, |[rate, _]| rate);
             shader.constant("SHADOW_CSM_RATE", rate);
-            shader.constant("SHADOW_CSM_AMOUNTS", format_args!("{}", vectors(pairs)));
+            shader.constant("SHADOW_CSM_AMOUNTS", format_args!("{}", vectors(&pairs)));
             shader.constant("SHADOW_CSM_SHIFT", s.shift() / s.shrink());
             shader.constant("SHADOW_CSM_GAIN", s.gain());
             shader.constant("SHADOW_LEAK", s.leak());

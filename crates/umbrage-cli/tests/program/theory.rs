@@ -241,8 +241,8 @@ fn what_makes_no_sense_is_refused() {
         (format!("lambda {VIEW} --theta x --warp psm"), "--theta"),
         (format!("lambda {VIEW} --theta 60"), "--warp"),
         (format!("lambda {VIEW} --theta 60 --warp lipsm"), "did you mean `lispsm`?"),
-        (format!("lambda {VIEW} --theta 60 --warp unfocused"), "not fitted to the view"),
-        (format!("lambda {VIEW} --theta 60 --warp uniform(stable)"), "not fitted to the view"),
+        (format!("lambda {VIEW} --theta 60 --warp unfocused"), "says what a map covers"),
+        (format!("lambda {VIEW} --theta 60 --warp uniform(stable)"), "says what a map covers"),
         (format!("lambda {VIEW} --theta 60 --warp lambda=1e-300"), "1e-12 metres"),
         (
             format!("lambda {VIEW} --theta 60 --warp psm --focus 3"),

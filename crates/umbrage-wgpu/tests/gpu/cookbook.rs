@@ -107,7 +107,7 @@ fn deferred_shading_gives_the_same_shadows() {
 #[test]
 fn smooth_normals_are_cured() {
     let kitchen = Kitchen::new(&[plain(), kitchen::dome(), box_at(DVec3::new(-3.0, 0.0, 1.0))]);
-    let technique = technique("adaptive:pcf3@2048");
+    let technique = technique("adaptive:pcf7@2048");
     let mut shadows = shadows(&kitchen.bench, &technique);
     kitchen.draw_maps(&mut shadows, &kitchen.plan(&[SUN], &technique));
     let dark = |expression: &str| {
@@ -248,7 +248,7 @@ fn a_resized_picture_has_its_own_errors() {
     assert!(sized([0, 720]).is_none());
     let [small, large] = [[640, 360], [1280, 720]].map(|size| sized(size).unwrap().unwrap());
     let mut planner = umbrage::Planner::new();
-    let technique = technique("adaptive@4px");
+    let technique = technique("adaptive@16px");
     let mut texels = |camera: &Camera| {
         planner.plan(camera, &[SUN], &Bounds::default(), &technique).unwrap().texels() as f64
     };

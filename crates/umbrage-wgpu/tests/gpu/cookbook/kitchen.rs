@@ -18,6 +18,8 @@ const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub(crate) struct Kitchen {
     pub(crate) bench: Bench,
     triangles: Vec<Vec3>,
+    /// Around all meshes but the first, the plain.
+    boxes: Vec<Aabb>,
     vertices: wgpu::Buffer,
     instance: wgpu::Buffer,
 }
@@ -56,7 +58,7 @@ fn hit(aabb: Aabb, p: DVec3, towards: DVec3) -> Option<f64> {
 
 /// Middle and radius of the sphere of which the dome is the upper part.
 const DOME: (DVec3, f64) = (DVec3::new(1.6, -0.4, 1.2), 1.6);
-const DOME_STEPS: u32 = 10;
+const DOME_STEPS: u32 = 5;
 
 /// A dome of flat triangles whose corners lie on a sphere.
 pub(crate) fn dome() -> Vec<Vec3> {
@@ -98,7 +100,7 @@ pub(crate) fn dark_on_dome(picture: &[[u8; 4]], camera: &Camera, to_sun: DVec3) 
             let Some(t) = on_sphere(camera.eye(), ray) else { continue };
             let p = camera.eye() + ray * t;
             let normal = (p - DOME.0) / DOME.1;
-            let is_clear = p.y > 0.15 && normal.dot(to_sun.normalize()) > 0.35;
+            let is_clear = p.y > 0.15 && normal.dot(to_sun.normalize()) > 0.25;
             if is_clear && normal.dot(-ray) > 0.3 {
                 all += 1;
                 dark += usize::from(picture[(y * SIZE[0] + x) as usize][0] < 191);
@@ -182,7 +184,7 @@ pub(crate) fn dome_shader(functions: &str, expression: &str) -> String {
         middle.y,
         middle.z,
         radius * 1.001,
-        radius * 0.97,
+        radius * 0.9,
     );
     let color = format!("lit(position, own_normal) + vec4f(0.0)");
     format!(
@@ -201,7 +203,9 @@ impl Kitchen {
         let triangles = meshes.concat();
         let vertices = bench.buffer(cast_slice(&triangles), BufferUsages::VERTEX);
         let instance = bench.instance(CasterInstance::new(&DAffine3::IDENTITY, DVec3::ZERO));
-        Self { bench, triangles, vertices, instance }
+        let around = |mesh: &Vec<Vec3>| Aabb::around(mesh.iter().map(|p| p.as_dvec3()));
+        let boxes = meshes.iter().skip(1).map(around).collect();
+        Self { bench, triangles, boxes, vertices, instance }
     }
 
     pub(crate) fn bounds(&self) -> Bounds<'static> {
@@ -481,12 +485,12 @@ impl Kitchen {
         is_hidden: impl Fn(DVec3) -> bool,
     ) {
         let (mut wrong, mut hidden, mut all) = (0, 0, 0);
-        let boxes = self.triangles[6..].chunks(36);
-        let boxes: Vec<Aabb> =
-            boxes.map(|b| Aabb::around(b.iter().map(|p| p.as_dvec3()))).collect();
         for (pixel, p) in ground_pixels(camera) {
             // Meshes stand before some of the ground.
-            if boxes.iter().any(|&b| hit(b, camera.eye(), p - camera.eye()).is_some()) {
+            let to_ground = p - camera.eye();
+            let is_before =
+                |&b: &Aabb| hit(b, camera.eye(), to_ground).is_some_and(|enters| enters < 1.0);
+            if self.boxes.iter().any(is_before) {
                 continue;
             }
             let lit = picture[(pixel.y as u32 * SIZE[0] + pixel.x as u32) as usize][0];

@@ -1,0 +1,113 @@
+//! Recipes for what a renderer needs beyond the tutorial (the example `renderer`). Each is a file in
+//! the folder `cookbook` of this crate, and a test runs each of them against known shadows.
+//!
+//! | you want | recipe |
+//! | --- | --- |
+//! | to draw skinned, displaced or procedural casters | [`custom_casters`] |
+//! | to shade from depth and a G-buffer's normals | [`deferred`] |
+//! | surfaces with smooth normals not to shadow themselves | [`smooth_normals`] |
+//! | several cameras at once | [`two_cameras`] |
+//! | to change the technique or its filter at run time | [`filter_at_run_time`] |
+//! | to see which map serves a point, and the map itself | [`show_a_map`] |
+//! | a filter for the sun and another for lamps | [`filters_per_light`] |
+//! | to follow the size of a window | [`resizing`] |
+//!
+//! Shadow lookups run once for each fragment that is shaded. Draw opaque models nearest first, and
+//! with a pipeline whose fragment stage does not `discard`, so that the device leaves out what is
+//! hidden: lookups then run several times less often.
+
+/// A pipeline of your own draws casters with any vertex shader: its vertex stage returns
+/// `shadow_caster` of the position in render space. One text is right on every device, whether the
+/// device clamps depths or not.
+///
+/// The boxes that you cull by (`MapPass::may_cast`) and tell of (`Casters::MovedIn`) must hold the
+/// vertices where the shader puts them, not where the mesh has them.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/custom_casters.rs")]
+#[doc = "```"]
+///
+/// `skinned.wgsl`:
+///
+#[doc = "```wgsl"]
+#[doc = include_str!("../cookbook/skinned.wgsl")]
+#[doc = "```"]
+pub mod custom_casters {}
+
+/// Deferred shading looks shadows up by the position that follows from the viewer's depths and by the
+/// G-buffer's normal. Keep the triangles' own normals there, or see [`smooth_normals`].
+///
+/// Far from the world's origin make `render_from_clip` and `Frame::render_origin` relative to the eye.
+/// Positions then keep their digits.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/deferred.rs")]
+#[doc = "```"]
+///
+/// `deferred.wgsl`:
+///
+#[doc = "```wgsl"]
+#[doc = include_str!("../cookbook/deferred.wgsl")]
+#[doc = "```"]
+pub mod deferred {}
+
+/// An interpolated normal leans off its triangle's plane. The lookup then expects depths beside the
+/// point that the triangle does not have, and facets shadow themselves where the filter is wide. In the
+/// test's scene, a dome of facets 17 degrees apart under `pcf7`, more than one pixel in a hundred of the
+/// lit dome is dark; with the triangles' own normals, and with the tolerant lookup below, none is.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/smooth_normals.rs")]
+#[doc = "```"]
+pub mod smooth_normals {}
+
+/// Plans follow the camera, so every view has maps of its own: a planner and [`Shadows`](crate::Shadows)
+/// each. Stable cascades (`uniform(stable)+z4`) do not depend on where the camera looks, but on where it
+/// is; they are no exception.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/two_cameras.rs")]
+#[doc = "```"]
+pub mod two_cameras {}
+
+/// A technique can change in every frame. Only its filter is part of the shader.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/filter_at_run_time.rs")]
+#[doc = "```"]
+pub mod filter_at_run_time {}
+
+/// `shadow_place(light, position)` tells which map serves a point and where in the map the point lies;
+/// `Plan::lookup` tells it on the CPU, and `Shadows::place` where a map lies in the depth texture.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/show_a_map.rs")]
+#[doc = "```"]
+///
+/// `show_a_map.wgsl`:
+///
+#[doc = "```wgsl"]
+#[doc = include_str!("../cookbook/show_a_map.wgsl")]
+#[doc = "```"]
+pub mod show_a_map {}
+
+/// Lights that share a filter share a plan and a budget of texels. A light with another filter has a
+/// planner and [`Shadows`](crate::Shadows) of its own, and its lookup's names get a prefix.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/filters_per_light.rs")]
+#[doc = "```"]
+///
+/// `filters_per_light.wgsl`:
+///
+#[doc = "```wgsl"]
+#[doc = include_str!("../cookbook/filters_per_light.wgsl")]
+#[doc = "```"]
+pub mod filters_per_light {}
+
+/// The size of the picture is part of the camera. Nothing of [`Shadows`](crate::Shadows) depends on it.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/resizing.rs")]
+#[doc = "```"]
+pub mod resizing {}
