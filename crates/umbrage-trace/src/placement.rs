@@ -11,7 +11,7 @@ const LARGEST: f64 = 1e150;
 pub(crate) struct Placement {
     pub(crate) mesh: usize,
     pub(crate) world_from_mesh: DAffine3,
-    /// Takes directions to mesh space, and so it does positions relative to the instance's origin.
+    /// Takes directions to mesh space, and also positions relative to the instance's origin.
     pub(crate) mesh_from_world: DMat3,
     /// Upper bound of the factor by which the transform lengthens any vector.
     stretch: f64,

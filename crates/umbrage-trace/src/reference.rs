@@ -202,7 +202,7 @@ impl<'a> Reference<'a> {
         let stored = |m: &DepthMap| m.texels.len() as u64;
         let texels = self.maps.iter().map(stored).sum::<u64>()
             * u64::from(bytes_per_texel(self.plan.filter));
-        // Mip level k has a 4ᵏ-th of the texels.
+        // Each mip level has a quarter of the texels of the level before it.
         let levels = match self.plan.filter {
             Filter::Prefiltered(prefilter) => {
                 let first = prefilter.first_level();
