@@ -84,8 +84,11 @@ fn start_log(verbose: u8) {
         1 => log::LevelFilter::Info,
         _ => log::LevelFilter::Debug,
     };
+    // That a driver is missing is no error where the CPU does instead; the program says so itself.
+    let drivers = if verbose == 0 { log::LevelFilter::Off } else { level };
     env_logger::Builder::new()
         .filter_level(level)
+        .filter_module("wgpu_hal", drivers)
         .format(|out, record| {
             use std::io::Write;
             writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())

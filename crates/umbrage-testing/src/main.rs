@@ -18,10 +18,10 @@ fn main() -> std::io::Result<ExitCode> {
     let is_fatal =
         !missing.is_empty() && std::env::var("UMBRAGE_REQUIRE").is_ok_and(|v| v == "all");
     for reason in missing {
-        eprintln!("tests are ignored that have this reason: {reason}");
+        eprintln!("some tests will be ignored: {reason}");
     }
     if is_fatal {
-        eprintln!("nothing may be missing where UMBRAGE_REQUIRE=all");
+        eprintln!("UMBRAGE_REQUIRE=all: nothing may be missing");
         return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)

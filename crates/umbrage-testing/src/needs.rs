@@ -20,9 +20,7 @@ fn named_scenes() -> String {
 fn missing_scenes() -> Option<String> {
     (!scenes().is_dir()).then(|| {
         let folder = named_scenes();
-        format!(
-            "needs third-party scenes: there is no folder {folder} (UMBRAGE_SCENES names another)"
-        )
+        format!("needs third-party scenes: {folder} is no folder (UMBRAGE_SCENES names another)")
     })
 }
 
@@ -38,10 +36,8 @@ fn missing_gpu() -> Option<String> {
         Some(files) => std::env::split_paths(&files).any(|f| f.is_file()),
         None => folders.into_iter().any(has_driver),
     };
-    (cfg!(target_os = "linux") && !is_here).then(|| {
-        "needs a GPU: there is no Vulkan driver, not even one in software (tools/setup installs it)"
-            .to_owned()
-    })
+    (cfg!(target_os = "linux") && !is_here)
+        .then(|| "needs a GPU: there is no Vulkan driver (tools/setup installs one)".to_owned())
 }
 
 fn missing_browser() -> Option<String> {
