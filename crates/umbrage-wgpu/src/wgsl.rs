@@ -197,7 +197,7 @@ fn add_width(shader: &mut Shader, filter: &Filter) {
 /// How far from a receiver the filter reads texels, as far as lookups with smooth normals allow for
 /// it: to the middle of the farthest texel.
 fn add_reach(shader: &mut Shader, filter: &Filter) {
-    const HALF_DIAGONAL: f32 = 0.707_106_8;
+    const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let [texels, widths] = match filter {
         Filter::Hard => [HALF_DIAGONAL, 0.0],
         Filter::Pcf { n } => [HALF_DIAGONAL * ((*n).clamp(1, Filter::MAX_PCF) + 1) as f32, 0.0],

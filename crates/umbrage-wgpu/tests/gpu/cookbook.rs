@@ -139,7 +139,7 @@ fn two_cameras_have_shadows_of_their_own() {
         let mut encoder = bench.encoder();
         let casters = kitchen.casters(&view.shadows);
         view.draw((&bench.device, &bench.queue), &mut encoder, (&camera, &[SUN], &bounds), |map| {
-            kitchen.draw(casters.pipeline(), map)
+            kitchen.draw(casters.pipeline(), map);
         })
         .unwrap();
         bench.finish(encoder);

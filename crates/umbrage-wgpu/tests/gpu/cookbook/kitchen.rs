@@ -186,14 +186,13 @@ pub(crate) fn dome_shader(functions: &str, expression: &str) -> String {
         radius * 1.001,
         radius * 0.9,
     );
-    let color = format!("lit(position, own_normal) + vec4f(0.0)");
     format!(
         "{functions}{normal}
         fn lit(position: vec3f, own_normal: vec3f) -> vec4f {{
             let smooth_normal = smooth_normal_at(position, own_normal);
             return vec4f({expression});
         }}{}",
-        shader_of_color(&color)
+        shader_of_color("lit(position, own_normal)")
     )
 }
 
