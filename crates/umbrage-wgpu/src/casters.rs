@@ -46,7 +46,7 @@ pub struct Mask<'a> {
     pub texture: &'a TextureView,
     /// A filtering sampler.
     pub sampler: &'a Sampler,
-    /// The factor of the texture's alpha.
+    /// The factor by which the texture's alpha is multiplied.
     pub factor: f32,
     /// Points whose alpha is below this value are holes.
     pub cutoff: f32,

@@ -153,7 +153,8 @@ pub(crate) struct CasterBuffer {
     bytes: Vec<u8>,
 }
 
-/// The state of a map when it was last drawn, by which a change is recognised.
+/// The state with which a map was drawn or is to be drawn. Comparing it with the plan shows whether
+/// the map must be drawn again.
 #[derive(Debug, Default)]
 pub(crate) struct Record {
     pub(crate) place: Option<Place>,
@@ -493,7 +494,7 @@ impl Shadows {
     ///   planes.
     /// - [`Error::Invalid`] if `frame.render_origin` is not finite.
     ///
-    /// The maps that are already drawn then remain as they are.
+    /// After an error, the maps that are drawn and the data that shaders read are as before.
     pub fn prepare<'a>(
         &'a mut self,
         device: &Device,
@@ -621,8 +622,8 @@ impl DepthTexture {
         [self.texture.width(), self.texture.height()]
     }
 
-    /// Whether maps that need this much fit, without leaving three quarters of the texture or more
-    /// unused.
+    /// Whether maps that need this much fit, without leaving more than three quarters of the
+    /// texture unused.
     fn holds(&self, size: [u32; 2], layers: u32) -> bool {
         let Extent3d { width, height, depth_or_array_layers } = self.texture.size();
         let texels =
