@@ -28,11 +28,13 @@ use wgpu::{
 pub(crate) struct Prefiltering {
     /// The number of texture layers that the statistics of a map take.
     textures: u32,
+    /// The ranges of these layers; each range is drawn in a pass of its own.
     groups: Vec<Range<u32>>,
     format: TextureFormat,
-    /// The mip level of the prefiltered maps that is stored first; a map of the depth texture is
-    /// level 0.
+    /// Mip level of the prefiltered map itself: 1 if it has half the resolution of the depth
+    /// texture, otherwise 0.
     first_level: u32,
+    /// The number of stored mip levels.
     levels: u32,
     /// Reach of the blur to each side, in texels of the stored level.
     radius: u32,

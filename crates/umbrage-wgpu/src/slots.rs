@@ -98,8 +98,8 @@ impl Slots {
     ) -> Result<Atlas, Error> {
         let max_side = support.max_side;
         let gutter = filter.reach_texels();
-        // The sides of the rectangle that is drawn for a map, and the coordinates at which it
-        // begins, are multiples of `filter.align_texels()`.
+        // A slot has the sides of the drawn rectangle less both gutters, so that all maps begin at
+        // multiples of the largest mip level's texel.
         let roomy = |n: u32| {
             let most = max_side.saturating_sub(2 * gutter).max(n);
             (n + n.div_ceil(ROOM)).min(most)
