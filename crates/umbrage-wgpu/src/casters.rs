@@ -12,9 +12,9 @@ use wgpu::{
     VertexStepMode,
 };
 
-/// Draws instanced meshes of rigid triangles, opaque or alpha-masked, into shadow maps. The maps
-/// are the same on every device. For other meshes, such as skinned ones, write a vertex stage of
-/// your own (see [`Shadows::caster_wgsl`]).
+/// Draws instanced meshes, opaque or alpha-masked, into shadow maps. Each position is multiplied by
+/// its instance's matrix. The maps are the same on every device. For other meshes, such as skinned
+/// ones, write a vertex stage of your own (see [`Shadows::caster_wgsl`]).
 #[derive(Debug)]
 pub struct MeshCasters {
     pipeline: RenderPipeline,

@@ -1,4 +1,5 @@
-//! The data that shaders read, in the layout of the structs of the same names in `wgsl/`.
+//! The data that shaders read. Each struct has the layout of the struct in `wgsl/` that its comment
+//! names.
 
 use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
 use crate::{Bias, Error, Support};

@@ -21,7 +21,7 @@ pub(crate) struct Slots {
     sizes: Vec<[u32; 2]>,
 }
 
-/// A slot is larger than its map by at least one part in this many.
+/// A slot with room is larger than its map by at least one part in this many.
 const ROOM: u32 = 8;
 /// An atlas is packed anew if its slots have more than this many times the texels that their maps
 /// need.

@@ -323,12 +323,12 @@ fn shaders_are_linked_as_by_wesl() {
         let linked: TranslationUnit = shader.link().parse().unwrap();
         assert_eq!(declarations(&linked), declarations(&expected), "{root}");
     }
-    // Drawn by another file.
+    // The module `clear` is used by `passes.rs`, which includes its file directly.
     used.insert("clear".to_owned());
     assert_eq!(used, package.into_iter().collect());
 }
 
-/// What Rust writes has an example in the package.
+/// Every module that Rust writes has an example in the package.
 #[test]
 fn examples_are_what_is_generated() {
     let file = |path| fs::read_to_string(folder().join(path).with_extension("wesl")).unwrap();
