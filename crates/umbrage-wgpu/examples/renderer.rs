@@ -117,9 +117,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         &layouts,
     );
 
-    // 5. In each frame, prepare the shadows and draw casters into the maps that need it. The shaders
-    //    here work in world space, so the render origin is zero. A renderer that works relative to
-    //    the camera would give the eye.
+    // 5. In each frame, prepare the shadows and draw casters into the maps that need it. The
+    //    shaders here work in world space, so the render origin is zero. A renderer that works
+    //    relative to the camera would give the eye.
     let mut encoder = device.create_command_encoder(&Default::default());
     let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
     shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, &Timestamps::default(), |map| {
