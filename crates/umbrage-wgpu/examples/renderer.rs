@@ -1,10 +1,11 @@
-//! The smallest complete renderer with Umbrage's shadows: boxes on a plain, drawn without a window.
+//! The smallest complete renderer with Umbrage's shadows. It draws boxes on a plain, without a
+//! window.
 //!
 //! ```sh
 //! cargo run --release -p umbrage-wgpu --example renderer -- shadows.png
 //! ```
 //!
-//! What has to do with shadows is numbered; all else is what any wgpu renderer does.
+//! The steps that concern shadows are numbered. All other code is what any wgpu renderer has.
 
 mod headless;
 
@@ -26,7 +27,7 @@ const CUBE: [u16; 36] = [
     0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5,
 ];
 
-/// A plain, and boxes on it: where a cube stands, and how large.
+/// The matrices that place and scale a cube as the plain and as the boxes on it.
 fn models() -> impl Iterator<Item = DAffine3> {
     let place = |at: [f64; 3], size: [f64; 3]| {
         DAffine3::from_translation(at.into()) * DAffine3::from_scale(size.into())
@@ -40,7 +41,7 @@ fn models() -> impl Iterator<Item = DAffine3> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // 1. Ask for the features that make shadows faster, as far as the adapter has them.
+    // 1. Request those features that make shadows faster, if the adapter has them.
     let instance =
         wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
@@ -67,8 +68,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         pass.draw_indexed(0..36, 0, instance..instance + 1);
     };
 
-    // 2. Plan the maps, each frame, with a planner that you keep: from your camera's matrices, the
-    //    lights, boxes around all models, and a technique.
+    // 2. In each frame, plan the maps with a planner that you keep from frame to frame. A plan
+    //    follows from your camera's matrices, the lights, boxes around all models, and a technique.
     let eye = Vec3::new(4.0, 5.0, 30.0);
     let view_from_world = rh::view::look_at_mat4(eye, Vec3::new(-6.0, 1.0, 0.0), Vec3::Y);
     let clip_from_view = rh::proj::directx::perspective(0.9, 16.0 / 9.0, 0.1, 300.0);
@@ -88,9 +89,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut planner = Planner::with_limits(support.limits());
     let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &technique)?;
 
-    // 3. The shadows themselves, once, with the technique's filter. And a pipeline that draws casters;
-    //    for one of your own, `Shadows::caster_wgsl`, `caster_fragment`, `depth_stencil_state` and
-    //    `primitive_state` have what it needs.
+    // 3. Create the shadows once, with the technique's filter, and a pipeline that draws casters.
+    //    For a pipeline of your own, use `Shadows::caster_wgsl`, `caster_fragment`,
+    //    `depth_stencil_state` and `primitive_state`.
     let shadow_options = ShadowOptions { filter: technique.filter, ..Default::default() };
     let mut shadows = Shadows::new(&device, support, &shadow_options)?;
     let positions = wgpu::VertexBufferLayout {
@@ -101,7 +102,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let layouts = [Some(positions), Some(CasterInstance::LAYOUT)];
     let casters = MeshCasters::new(&device, &shadows, MeshKind::Opaque, &layouts);
 
-    // 4. Your pipeline: Umbrage's text before your shader's, for the bind group that you name, and its layout there.
+    // 4. Create your pipeline. Umbrage's text, for the bind group whose index you give, stands
+    //    before your shader's text, and the pipeline layout has Umbrage's layout at that index.
     let text = shadows.lookup_wgsl(1) + include_str!("shader.wgsl");
     let source = wgpu::ShaderSource::Wgsl(text.into());
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
@@ -115,8 +117,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         &layouts,
     );
 
-    // 5. Each frame: prepare the shadows, and draw casters into the maps that need it. Shaders here work in world space, so
-    //    its origin is zero; a camera-relative renderer would give the eye.
+    // 5. In each frame, prepare the shadows and draw casters into the maps that need it. The
+    //    shaders here work in world space, so the render origin is zero. A renderer that works
+    //    relative to the camera would give the eye.
     let mut encoder = device.create_command_encoder(&Default::default());
     let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };
     shadows.prepare(&device, &queue, &frame)?.encode(&mut encoder, &Timestamps::default(), |map| {
@@ -128,7 +131,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     });
 
-    // 6. Shade, with Umbrage's bind group where its text looks for it.
+    // 6. Shade, with Umbrage's bind group at the index that you gave in step 4.
     let target = headless::Target::new(&device, SIZE);
     let mut pass = target.begin(&mut encoder);
     pass.set_pipeline(&pipeline);

@@ -27,10 +27,12 @@ fn vertex(
 
 @fragment
 fn fragment(in: Fragment) -> @location(0) vec4f {
-    // The triangle's own normal is what shadows want; derivatives give it without a vertex attribute.
+    // Shadows need the triangle's own normal; derivatives of the position give it without a vertex
+    // attribute.
     let normal = normalize(shadow_normal(in.position));
     let incidence = max(dot(normal, view.to_sun), 0.0);
-    // Light 0 of the plan is the sun. What faces away is dark whatever a shadow map says.
+    // Light 0 of the plan is the sun. Surfaces that face away from the sun are dark whatever the
+    // shadow map says.
     let sun = incidence * shadow_visibility(0u, in.position, normal);
     return vec4f(vec3f(0.9, 0.85, 0.75) * sun + vec3f(0.10, 0.13, 0.18), 1.0);
 }

@@ -12,42 +12,43 @@ use wgpu::{
     VertexStepMode,
 };
 
-/// Draws plain meshes, instanced, into shadow maps: positions times a matrix, and an alpha mask if
-/// there is one. On every device it gives the same maps. For other meshes, say skinned ones, write a
-/// vertex stage of your own ([`Shadows::caster_wgsl`]).
+/// Draws instanced meshes, opaque or alpha-masked, into shadow maps. Each position is multiplied by
+/// its instance's matrix. The maps are the same on every device. For other meshes, such as skinned
+/// ones, write a vertex stage of your own (see [`Shadows::caster_wgsl`]).
 #[derive(Debug)]
 pub struct MeshCasters {
     pipeline: RenderPipeline,
     mask_layout: Option<BindGroupLayout>,
 }
 
-/// Which meshes.
+/// Whether meshes have holes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshKind {
-    /// Without holes.
+    /// Meshes without holes.
     Opaque,
-    /// Where alpha is below a cutoff nothing casts.
+    /// Meshes with holes: nothing casts where the material's alpha is below a cutoff (see
+    /// [`Mask`]).
     Masked,
 }
 
-/// An instance of a mesh, as the vertex buffer holds it.
+/// One instance of a mesh, as stored in the vertex buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CasterInstance {
-    /// The three rows of the matrix from mesh to render space.
+    /// The three rows of the matrix from mesh space to render space.
     pub render_from_mesh: [Vec4; 3],
 }
 
-/// The alpha of a masked material: `factor` times the texture's.
+/// The alpha of a masked material, which is `factor` times the texture's alpha.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask<'a> {
-    /// Its alpha counts; sampled at its first level.
+    /// The texture whose alpha is used. It is sampled at mip level 0.
     pub texture: &'a TextureView,
     /// A filtering sampler.
     pub sampler: &'a Sampler,
-    /// What the texture's alpha is multiplied with.
+    /// The factor by which the texture's alpha is multiplied.
     pub factor: f32,
-    /// Below this there is no surface.
+    /// Points whose alpha is below this value are holes.
     pub cutoff: f32,
 }
 
@@ -59,7 +60,8 @@ impl CasterInstance {
         attributes: &[row(0), row(1), row(2)],
     };
 
-    /// An instance that stands in the world where `world_from_mesh` puts it.
+    /// An instance with the matrix `world_from_mesh` from mesh space to world space.
+    /// `render_origin` must be that of the [`Frame`](crate::Frame).
     pub fn new(world_from_mesh: &DAffine3, render_origin: DVec3) -> Self {
         let m = world_from_mesh.matrix3;
         let t = world_from_mesh.translation - render_origin;
@@ -77,9 +79,10 @@ const fn row(i: u32) -> VertexAttribute {
 }
 
 impl MeshCasters {
-    /// A pipeline for vertices of this layout: `buffers` have the position (`Float32x3`) at shader location 0, the
-    /// instance's rows at locations 1 to 3 (as [`CasterInstance::LAYOUT`] has them), and for masked meshes texture
-    /// coordinates (`Float32x2`) at location 4.
+    /// Creates the pipeline for vertex buffers with these layouts. `buffers` must have the position
+    /// (`Float32x3`) at shader location 0, the instance's rows at locations 1 to 3 (see
+    /// [`CasterInstance::LAYOUT`]) and, for masked meshes, texture coordinates (`Float32x2`) at
+    /// location 4.
     pub fn new(
         device: &Device,
         shadows: &Shadows,
@@ -128,13 +131,14 @@ impl MeshCasters {
         Self { pipeline, mask_layout }
     }
 
-    /// Set it in a [`MapPass`](crate::MapPass), then vertex buffers as told and an index buffer, and draw. Masked meshes take
-    /// their [mask](Self::mask) in bind group 1.
+    /// The pipeline. Set it in a [`MapPass`](crate::MapPass), set vertex buffers of the layouts
+    /// given to [`new`](Self::new) and an index buffer if you use one, and draw. Masked meshes also
+    /// need their [mask](Self::mask) in bind group 1.
     pub fn pipeline(&self) -> &RenderPipeline {
         &self.pipeline
     }
 
-    /// The bind group of a mask; `None` if the pipeline is not for masked meshes.
+    /// The bind group of a mask; `None` if the pipeline is for opaque meshes.
     pub fn mask(&self, device: &Device, queue: &Queue, mask: &Mask<'_>) -> Option<BindGroup> {
         let layout = self.mask_layout.as_ref()?;
         let contents = data::Mask { factor: mask.factor, cutoff: mask.cutoff };

@@ -1,4 +1,5 @@
-//! What shaders read, as they read it: modules in `wgsl/` have the same structs.
+//! The data that shaders read. Each struct has the layout of the struct in `wgsl/` that its comment
+//! names.
 
 use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
 use crate::{Bias, Error, Support};
@@ -64,7 +65,7 @@ pub(crate) struct Mask {
     pub(crate) cutoff: f32,
 }
 
-/// All that lookup reads. Empty maps are left out.
+/// All data that lookup reads from buffers. Empty maps are left out.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Lookup {
     pub(crate) settings: Settings,
@@ -73,7 +74,7 @@ pub(crate) struct Lookup {
     pub(crate) planes: Vec<Vec4>,
 }
 
-/// Where maps lie in which texture, and where render space does.
+/// The places of the maps, the size of the texture that holds them, and the origin of render space.
 pub(crate) struct Placed<'a> {
     pub(crate) places: &'a [Option<Place>],
     pub(crate) texture_size: [u32; 2],
@@ -82,7 +83,8 @@ pub(crate) struct Placed<'a> {
 }
 
 impl Lookup {
-    /// Tells of a plan's maps, in the buffers of the one before.
+    /// Fills the buffers with a plan's maps; their previous contents are dropped, their memory is
+    /// reused.
     pub(crate) fn fill(&mut self, plan: &Plan, placed: &Placed<'_>) {
         let Self { settings, lights, maps, planes } = self;
         lights.clear();
@@ -115,7 +117,7 @@ impl Lookup {
         };
     }
 
-    /// Whether the device can be told of so many.
+    /// Checks that a device without storage buffers has room for as many lights, maps and planes.
     pub(crate) fn check(&self, support: &Support) -> Result<(), Error> {
         let counts = [
             ("lights", self.lights.len(), MAX_LIGHTS),
@@ -152,7 +154,7 @@ impl Map {
             t: (m.row(1) * size[1]).as_vec4(),
             depth: m.row(2).as_vec4(),
             w: m.row(3).as_vec4(),
-            // Nothing lies on the negative side of the plane that is at infinity.
+            // The plane at infinity has no point on its negative side, so the map never fades.
             fade_from: map.fade_from.map_or(Vec4::W, plane),
             beam_scale: beam_scale(map),
             slab: slab(map),
@@ -178,7 +180,7 @@ pub(crate) struct PrefilterMap {
 }
 
 impl PrefilterMap {
-    /// A map whose numbers take `textures` layers.
+    /// A map whose statistics take `textures` layers.
     pub(crate) fn new(map: &ShadowMap, place: &Place, textures: u32) -> Self {
         Self {
             beam_scale: beam_scale(map),
@@ -190,14 +192,15 @@ impl PrefilterMap {
     }
 }
 
-/// The fourth coordinate of what a map's beams consist of: per texel in s and in t, per depth, and at texel 0 and depth 0.
+/// The fourth coordinate of the points of a map's beams: its growth per texel in s, per texel in t
+/// and from depth 0 to depth 1, and its value at texel 0 and depth 0.
 fn beam_scale(map: &ShadowMap) -> Vec4 {
     let w = map.local_from_shadow.row(3);
     let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
     DVec4::new(w.x / width, w.y / height, w.z, w.w).as_vec4()
 }
 
-/// What `shadow_slab_depth` asks for.
+/// The argument `slab` of `shadow_slab_depth` in `wgsl/slab.wesl`, which explains it.
 fn slab(map: &ShadowMap) -> Vec4 {
     let [width, height] = map.resolution.map(|n| f64::from(n.max(1)));
     match map.slab {
@@ -206,7 +209,8 @@ fn slab(map: &ShadowMap) -> Vec4 {
         }
         Slab::Distances { axis, near, far } => {
             let m = map.local_from_shadow;
-            // Of depth it has none: the lamp is where depth has no end.
+            // The distance times the fourth coordinate does not depend on depth, because the lamp
+            // is the point at which depth is infinite.
             let apex = axis.dot(map.apex.unwrap_or(DVec3::ZERO));
             let row = |c: DVec4| (axis.dot(c.truncate()) - apex * c.w) / (far - near);
             let [s, t, zero] = [row(m.x_axis), row(m.y_axis), row(m.w_axis)];
@@ -216,12 +220,13 @@ fn slab(map: &ShadowMap) -> Vec4 {
     .as_vec4()
 }
 
-/// From render space to a map's local space.
+/// The matrix from render space to a map's local space.
 pub(crate) fn local_from_render(map: &ShadowMap, render_origin: DVec3) -> DMat4 {
     DMat4::from_translation(render_origin - map.origin)
 }
 
-/// From render space to the clip space of a viewport that covers all that is drawn for a map.
+/// The matrix from render space to the clip space of a viewport that covers all texels drawn for a
+/// map, its gutter included.
 pub(crate) fn clip_from_render(map: &ShadowMap, filter: &Filter, render_origin: DVec3) -> DMat4 {
     let m = map.shadow_from_local * local_from_render(map, render_origin);
     let w = m.row(3);
@@ -231,7 +236,7 @@ pub(crate) fn clip_from_render(map: &ShadowMap, filter: &Filter, render_origin: 
         let [map, drawn] = [map.resolution[i], drawn[i]].map(f64::from);
         (m.row(i) * map + w * gutter) * (2.0 / drawn) - w
     };
-    // The first row of texels is the uppermost one of a viewport, where clip space has y = 1.
+    // The first row of texels is the uppermost row of a viewport, where y = 1 in clip space.
     let [x, y] = [across(0), -across(1)];
     DMat4::from_cols(x, y, m.row(2), w).transpose()
 }

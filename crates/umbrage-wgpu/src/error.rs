@@ -1,33 +1,34 @@
 use umbrage::AtlasTooLarge;
 use umbrage::visibility::Filter;
 
-/// Why there are no shadows.
+/// Why shadows cannot be created or prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The device cannot do what the library cannot do without.
+    /// The device lacks a capability that the library or the chosen filter needs.
     #[error("the device lacks {what}, {why}")]
     Unsupported {
-        /// What is missing.
+        /// The missing capability.
         what: &'static str,
-        /// What it would be for, and what to do.
+        /// What the capability is needed for, and what to do instead.
         why: &'static str,
     },
-    /// The plan's maps do not fit into a texture of this device.
+    /// The maps of the plan do not fit into a texture of this device.
     #[error(transparent)]
     NoRoom(#[from] AtlasTooLarge),
-    /// The plan has more of something than this device can be told of. Devices with storage buffers can be
-    /// told of any number.
+    /// The plan has more lights, maps or planes than fit into the uniform buffers of this device.
+    /// Devices with storage buffers have no such limit.
     #[error("{given} {what}, but this device, which has no storage buffers, can take {max} only")]
     TooMany {
-        /// Of what: lights, maps or planes around what maps serve.
+        /// The elements that are too many: lights, maps, or planes around the parts of the view
+        /// that maps serve.
         what: &'static str,
-        /// How many there are.
+        /// The number of these elements in the plan.
         given: usize,
-        /// How many are possible.
+        /// The greatest possible number on this device.
         max: usize,
     },
-    /// No GPU rasterises a map with logarithmic rows ([`Warp::Log`](umbrage::Warp::Log)).
+    /// A map has logarithmic rows ([`Warp::Log`](umbrage::Warp::Log)), which no GPU can rasterise.
     #[error(
         "map {map} has logarithmic rows, which no GPU rasterises: take another warp than `log`"
     )]
@@ -35,26 +36,26 @@ pub enum Error {
         /// Index of the map in the plan.
         map: usize,
     },
-    /// The plan is for another filter than the shadows look maps up with: casters would be missing at
-    /// the maps' borders, or soft shadows would not know how far casters lie. Plan with the
-    /// [`Technique`](umbrage::Technique) whose filter the
-    /// [`ShadowOptions`](crate::ShadowOptions::filter) have.
+    /// The plan is for another filter than the one with which the maps are looked up. Casters would
+    /// be missing at the borders of the maps, or soft shadows would lack the depths of their
+    /// casters. Use one [`Technique`](umbrage::Technique) for the plan, and its filter in the
+    /// [`ShadowOptions`](crate::ShadowOptions::filter).
     #[error(
         "the plan is for the filter `{planned}`, but the maps are looked up with `{looked_up}`: give both the \
          same technique's filter"
     )]
     OtherFilter {
-        /// The plan's.
+        /// The filter of the plan.
         planned: Filter,
-        /// The shadows' own.
+        /// The filter of the [`ShadowOptions`](crate::ShadowOptions::filter).
         looked_up: Filter,
     },
-    /// A field's value makes no sense.
+    /// The value of a field is not valid.
     #[error("{field}: {problem}")]
     Invalid {
         /// Path of the field, such as `frame.render_origin`.
         field: &'static str,
-        /// What is wrong with it and what would be right.
+        /// What is wrong with the value, and which values are valid.
         problem: String,
     },
 }

@@ -11,7 +11,7 @@ use wgpu::{
     ShaderModuleDescriptor, ShaderSource, StoreOp, TextureView, VertexState,
 };
 
-/// A frame whose maps can be drawn now.
+/// A frame that is prepared: its maps can now be drawn with [`encode`](Self::encode).
 #[derive(Debug)]
 #[must_use = "maps are drawn only if their passes are encoded"]
 pub struct Prepared<'a> {
@@ -20,41 +20,46 @@ pub struct Prepared<'a> {
     pub(crate) render_origin: DVec3,
 }
 
-/// A map's turn in a depth pass. Bind group 0 has the map's matrix already, as
-/// [`Shadows::caster_wgsl`] takes it, and viewport and scissor are set; leave these two as they are.
+/// One map's part of a depth pass. The map's matrix is already bound in bind group 0, as
+/// [`Shadows::caster_wgsl`] uses it. Viewport and scissor rectangle are already set; do not change
+/// them.
 #[derive(Debug)]
 pub struct MapPass<'p, 'e> {
-    /// Draw casters into this.
+    /// The render pass into which you draw the casters.
     pub pass: &'p mut RenderPass<'e>,
-    /// The map as planned: its caster planes say which casters to leave out, as
-    /// [`may_cast`](Self::may_cast) does for boxes.
+    /// The planned map. Its caster planes tell which casters can be culled;
+    /// [`may_cast`](Self::may_cast) tests boxes against them.
     pub shadow_map: &'p ShadowMap,
-    /// Its index in the plan.
+    /// The index of the map in the plan.
     pub index: usize,
-    /// From render space to the pass's clip space, for pipelines that do not take it from bind group 0.
+    /// The matrix from render space to the pass's clip space, for pipelines that do not read it
+    /// from bind group 0.
     pub clip_from_render: Mat4,
     /// World position of render space's origin, metres.
     pub render_origin: DVec3,
 }
 
 impl MapPass<'_, '_> {
-    /// Whether anything in `aabb` (world space) can cast a shadow into the map. Never `false` for
-    /// what does; `true` for some of what does not.
+    /// Whether anything in `aabb` (world space) can cast a shadow into the map. The result is
+    /// conservative: it is never `false` for a box that can cast into the map, but may be `true`
+    /// for one that cannot.
     pub fn may_cast(&self, aabb: Aabb) -> bool {
         self.shadow_map.may_cast(aabb)
     }
 }
 
-/// Where to write when passes begin and end.
+/// The timestamps that passes write when they begin and end.
 #[derive(Clone, Debug, Default)]
 pub struct Timestamps<'a> {
-    /// All that draws casters: the first pass begins, the last one ends.
+    /// Timestamps of all passes that draw casters: the first pass writes the beginning, the last
+    /// one the end.
     pub depth: Option<RenderPassTimestampWrites<'a>>,
-    /// All that filters ahead of lookup.
+    /// Timestamps of all passes of the prefilter, in the same way.
     pub filter: Option<RenderPassTimestampWrites<'a>>,
 }
 
-/// Of the timestamps of many passes, those that one of them writes.
+/// The timestamps that one pass of many writes: the beginning if it is the first, the end if it is
+/// the last.
 pub(crate) fn part<'a>(
     all: Option<&RenderPassTimestampWrites<'a>>,
     is_first: bool,
@@ -71,17 +76,19 @@ pub(crate) fn part<'a>(
 }
 
 impl Prepared<'_> {
-    /// Indices in the plan of the maps that will be drawn. Others are drawn already, or empty.
+    /// Indices in the plan of the maps that [`encode`](Self::encode) will draw. All other maps are
+    /// empty or already drawn.
     pub fn stale(&self) -> impl Iterator<Item = usize> + '_ {
         let records = self.shadows.records.iter().enumerate();
         records.filter(|(_, r)| r.stale_place().is_some()).map(|(index, _)| index)
     }
 
-    /// Encodes the passes in which `draw` draws all casters of one map after the other. Maps that are as they were, and
-    /// empty ones, are left out; without any there is no pass at all, and no timestamp is written.
+    /// Encodes the passes that draw the maps. `draw` is called once for each map and must draw all
+    /// casters of that map. Maps that have not changed and empty maps are left out. If no map is
+    /// left, no pass is encoded and no timestamp is written.
     ///
-    /// Returns how many maps were drawn. The passes must be submitted before those that look the maps up, in
-    /// the same encoder or an earlier one.
+    /// Returns the number of maps drawn. Submit these passes in the same encoder as the passes that
+    /// look the maps up, ahead of those, or in an earlier submission.
     pub fn encode(
         self,
         encoder: &mut CommandEncoder,
@@ -102,7 +109,7 @@ impl Prepared<'_> {
         let [first, last] = [stale_layers().next(), stale_layers().next_back()];
         let mut drawn = 0;
         for layer in stale_layers() {
-            // A layer that is drawn whole is cleared whole, which costs least.
+            // If all maps of a layer are drawn, clearing the whole layer costs least.
             let in_layer = |r: &&Record| r.place.is_some_and(|p| p.layer as usize == layer);
             let is_whole = records.iter().filter(in_layer).all(|r| r.stale_place().is_some());
             let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
@@ -160,12 +167,13 @@ fn begin<'e>(
     })
 }
 
-/// Sets viewport and scissor to all that is drawn for a map.
+/// Sets viewport and scissor rectangle to the texels that are drawn for a map, its gutter included.
 fn aim(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter) {
     aim_level(pass, place, filter, 0, [0; 2]);
 }
 
-/// The same in a copy that is 2^`level` times smaller, without so many texels at the sides.
+/// Sets viewport and scissor rectangle in mip level `level`, and leaves out `inset` texels of that
+/// level at each side.
 pub(crate) fn aim_level(
     pass: &mut RenderPass<'_>,
     place: &Place,
@@ -181,7 +189,7 @@ pub(crate) fn aim_level(
     pass.set_scissor_rect(x, y, w, h);
 }
 
-/// Clears a part of a layer.
+/// The pipeline that clears one map in a layer whose other maps stay.
 #[derive(Debug)]
 pub(crate) struct Clear {
     pipeline: RenderPipeline,

@@ -1,4 +1,4 @@
-//! The passes of filters that are applied ahead of lookup.
+//! The passes of prefilters.
 
 use crate::data::PrefilterMap;
 use crate::passes::{aim_level, part};
@@ -23,17 +23,20 @@ use wgpu::{
     VertexState,
 };
 
-/// Encodes and blurs the maps that were drawn.
+/// Encodes the maps that were drawn as statistics, and blurs the statistics.
 #[derive(Debug)]
 pub(crate) struct Prefiltering {
-    /// Textures that a map's numbers take, and which of them are drawn at a time.
+    /// The number of texture layers that the statistics of a map take.
     textures: u32,
+    /// The ranges of these layers; each range is drawn in a pass of its own.
     groups: Vec<Range<u32>>,
     format: TextureFormat,
-    /// Of what is stored, the map itself being level 0.
+    /// Mip level of the prefiltered map itself: 1 if it has half the resolution of the depth
+    /// texture, otherwise 0.
     first_level: u32,
+    /// The number of stored mip levels.
     levels: u32,
-    /// How far the blur reaches to each side, texels of what is stored.
+    /// Reach of the blur to each side, in texels of the stored level.
     radius: u32,
     encode: Vec<RenderPipeline>,
     rows: Vec<RenderPipeline>,
@@ -45,32 +48,33 @@ pub(crate) struct Prefiltering {
     uniforms: Buffer,
     bytes: Vec<u8>,
     numbers: Numbers,
-    /// What is blurred along rows.
+    /// The statistics blurred along rows only.
     scratch: Option<Numbers>,
     bindings: Bindings,
 }
 
-/// Numbers in layers: those of a layer of maps follow one another.
+/// Textures of statistics. The layers for one layer of maps follow one another.
 #[derive(Debug)]
 struct Numbers {
     all: TextureView,
-    /// Of each level, what passes read and draw into.
+    /// For each mip level, the view that passes read, and for each layer the view that they draw
+    /// into.
     sources: Vec<TextureView>,
     layers: Vec<Vec<TextureView>>,
     bytes: u64,
 }
 
-/// What passes read.
+/// The bind groups of the textures that passes read.
 #[derive(Debug)]
 struct Bindings {
-    /// Depths, one a layer of maps.
+    /// The depths; one bind group for each layer of maps.
     depths: Vec<BindGroup>,
-    /// One a level.
+    /// The statistics; one bind group for each mip level.
     numbers: Vec<BindGroup>,
     scratch: Option<BindGroup>,
 }
 
-/// How a statistic's numbers are stored on a GPU.
+/// The texture format in which a GPU stores a statistic.
 fn format(statistic: &Statistic) -> TextureFormat {
     match (statistic.storage(), statistic.channels()) {
         (Storage::Float32, 1) => TextureFormat::R32Float,
@@ -82,7 +86,7 @@ fn format(statistic: &Statistic) -> TextureFormat {
     }
 }
 
-/// That the device can store and interpolate a statistic's numbers.
+/// Checks that the device can store and interpolate a statistic.
 fn check(statistic: &Statistic, support: &Support) -> Result<(), Error> {
     let lacks = |what| {
         let why = "in which this filter stores its numbers: take another filter, such as pcf";
@@ -173,17 +177,17 @@ impl Prefiltering {
         })
     }
 
-    /// What lookup samples.
+    /// The prefiltered maps, which lookup samples.
     pub(crate) fn view(&self) -> &TextureView {
         &self.numbers.all
     }
 
-    /// Memory of the numbers, without what is only needed to blur them.
+    /// Memory of the prefiltered maps, bytes, without the scratch texture that only the blur needs.
     pub(crate) fn bytes(&self) -> u64 {
         self.numbers.bytes
     }
 
-    /// Makes room for the maps of another depth texture.
+    /// Creates textures for the maps of a new depth texture.
     pub(crate) fn resize(&mut self, device: &Device, support: &Support, depths: &DepthTexture) {
         let size = stored_size(depths, self.first_level);
         let numbers = |levels| {
@@ -206,7 +210,7 @@ impl Prefiltering {
         );
     }
 
-    /// Tells the passes where maps lie.
+    /// Uploads the places and depth ranges of the maps for the passes.
     pub(crate) fn upload(
         &mut self,
         device: &Device,
@@ -233,7 +237,8 @@ impl Prefiltering {
         queue.write_buffer(&self.uniforms, 0, &self.bytes);
     }
 
-    /// Encodes and blurs the stale maps of a layer. Timestamps are those of the whole, where this layer is the first or last.
+    /// Encodes and blurs the stale maps of a layer. `timestamps` has the beginning only if this
+    /// layer is the first, and the end only if it is the last.
     pub(crate) fn encode(
         &self,
         encoder: &mut CommandEncoder,
@@ -244,8 +249,10 @@ impl Prefiltering {
     ) {
         let numbers = &self.numbers.layers;
         let Bindings { depths, numbers: sources, scratch: blurred } = &self.bindings;
-        // Pipelines, what they read, draw into, at which level, and what is left out at the sides, where a blur would read beyond what is drawn. Lookups do not
-        // reach there.
+        // Each step has pipelines, the bind group that they read, the views that they draw into,
+        // the mip level, and the inset: the texels at each side that are left out because the blur
+        // would read beyond the drawn texels there. Lookups do not reach the texels that are left
+        // out.
         let radius = self.radius;
         let mut steps = vec![(&self.encode, &depths[layer], &numbers[0], 0, [0; 2])];
         if let (Some(scratch), Some(blurred)) = (&self.scratch, blurred) {
@@ -284,7 +291,7 @@ impl Prefiltering {
     }
 }
 
-/// Texels of what is stored of depths, width and height.
+/// Width and height, in texels of the first stored mip level, of the prefiltered maps.
 fn stored_size(depths: &DepthTexture, first_level: u32) -> [u32; 2] {
     depths.size().map(|n| (n >> first_level).max(1))
 }
@@ -294,7 +301,7 @@ fn attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
         view,
         depth_slice: None,
         resolve_target: None,
-        // Other maps' numbers stay.
+        // The statistics of other maps must be kept.
         ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
     })
 }
@@ -309,7 +316,8 @@ impl Numbers {
         textures: u32,
         levels: u32,
     ) -> Self {
-        // Very small textures have fewer levels than maps have copies; nothing is ever drawn into those.
+        // Very small textures have fewer mip levels than the prefilter asks for. Nothing is ever
+        // drawn into the levels that they lack.
         let levels = levels.min(width.max(height).max(1).ilog2() + 1);
         let layers = support.array_layers(textures * depths.layers.len() as u32);
         let texture = device.create_texture(&TextureDescriptor {

@@ -19,77 +19,88 @@ use wgpu::{
     TextureViewDescriptor, TextureViewDimension,
 };
 
-/// Format of the depth texture.
+/// Format of the texture that holds the depths of all maps.
 pub const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
-/// How shadow maps are held and looked up.
+/// How shadow maps are stored in textures and looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShadowOptions {
-    /// How the texels around a point are looked up.
+    /// How lookup combines the texels around a point. A plan must be made for the same filter.
     pub filter: Filter,
-    /// Who compares depths.
+    /// Whether the shader or the texture unit compares depths. [`Shadows::options`] gives the
+    /// choice that the device and the filter allowed.
     pub comparison: Comparison,
-    /// How maps share a texture.
+    /// Whether maps share one layer of the depth texture or have a layer each.
     pub layout: Layout,
 }
 
-/// Who compares a receiver's depth with those of the texels around it.
+/// What compares a receiver's depth with the depths of the texels around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Comparison {
-    /// The shader: each texel is compared with the depth of the receiver's plane there, as
-    /// [`umbrage::visibility`] has it. Exact.
+    /// The shader compares each texel's depth with the depth of the receiver's plane at that texel,
+    /// exactly as [`umbrage::visibility`] does. The `spread` and `pcss` filters always compare this
+    /// way.
     #[default]
     PerTexel,
-    /// The texture unit: four texels at a time are compared with the least depth of the receiver's plane among them, and
-    /// weighted bilinearly. Shadows of steep receivers begin up to a texel's slope late. What devices that cannot
-    /// fetch depths take in any case.
+    /// The texture unit compares four texels at a time with the least depth that the receiver's
+    /// plane has among them, and weights the results bilinearly. On receivers that are steep to the
+    /// light, shadows therefore begin late, by up to the depth by which the receiver's plane rises
+    /// over a texel. Devices that cannot fetch depths always compare this way.
     Hardware,
 }
 
 /// How maps share the depth texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
-    /// Side by side in one layer, drawn in one pass: the fewest texels.
+    /// All maps lie side by side in one layer and are drawn in one pass. This takes the fewest
+    /// texels.
     #[default]
     Atlas,
-    /// Each in a layer of its own, with a pass of its own. Layers are as large as the largest map.
+    /// Each map has a layer of its own and is drawn in a pass of its own. All layers are as large
+    /// as the largest map.
     Layers,
 }
 
-/// What to allow for beyond what the texels themselves ask for. Zero is right where what is drawn into the maps
-/// is what receives; more where it is coarser (another level of detail, say).
+/// A margin on every depth comparison, added to the bias that the lookup derives from the texels
+/// themselves. Zero is right where receivers and casters are the same geometry. Where the geometry
+/// that is drawn into the maps is coarser (another level of detail, for example), set a positive
+/// margin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bias {
-    /// In widths of the texel at the receiver, laid along the beam; may be negative, down to −½.
+    /// Margin in widths of the texel at the receiver, measured along the beam. It may be negative,
+    /// down to −½.
     pub texels: f32,
-    /// In metres along the beam.
+    /// Margin in metres along the beam.
     pub metres: f32,
 }
 
-/// What is to be drawn and looked up in a frame.
+/// The input of [`Shadows::prepare`]: the maps to draw and look up in one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// The maps.
+    /// The plan of the maps. Its filter must be that of the [`ShadowOptions`].
     pub plan: &'a Plan,
-    /// World position of render space's origin, metres.
+    /// World position of render space's origin, metres. All three coordinates must be finite.
     pub render_origin: DVec3,
-    /// What has happened to the casters since the last frame.
+    /// How the casters differ from those of the last prepared frame.
     pub casters: Casters<'a>,
 }
 
-/// What has happened to the casters since the last frame that was prepared: which maps must be drawn again although
-/// they themselves are as they were.
+/// How the casters differ from those of the last prepared frame. This decides which maps are drawn
+/// again although their own matrix and size have not changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Casters<'a> {
-    /// Anything: draw all maps.
+    /// Any caster may have moved, so all maps are drawn again.
     Moved,
-    /// What changed lies in these boxes (world space), before and after. Draw the maps into which they cast.
+    /// All casters that changed lie within these boxes (world space), which must contain both their
+    /// old and their new positions. Only maps into which something in the boxes can cast a shadow
+    /// are drawn again.
     MovedIn(&'a [Aabb]),
-    /// Nothing.
+    /// No caster has moved.
     Unmoved,
 }
 
-/// The shadow maps of one view: their depths, and what shaders look them up by.
+/// The shadow maps of one view on the GPU: the depth texture, and the buffers, the bind group and
+/// the shader text with which shaders look the maps up.
 #[derive(Debug)]
 pub struct Shadows {
     options: ShadowOptions,
@@ -105,24 +116,24 @@ pub struct Shadows {
     lookup_layout: BindGroupLayout,
     lookup_bind_group: BindGroup,
     pub(crate) clear: Clear,
-    /// If the filter is applied ahead of lookup.
+    /// `Some` if the filter is a prefilter.
     pub(crate) prefiltering: Option<Prefiltering>,
-    /// One a map of the plan.
+    /// One for each map of the plan.
     pub(crate) records: Vec<Record>,
 }
 
-/// The depths of all maps.
+/// The texture that holds the depths of all maps.
 #[derive(Debug)]
 pub(crate) struct DepthTexture {
     texture: Texture,
     all: TextureView,
-    /// One a layer.
+    /// One view for each layer.
     pub(crate) layers: Vec<TextureView>,
-    /// Nothing was ever drawn into it.
+    /// Whether nothing has been drawn into the texture yet.
     pub(crate) is_fresh: bool,
 }
 
-/// What lookup reads.
+/// The buffers that lookup reads.
 #[derive(Debug)]
 struct Buffers {
     settings: Buffer,
@@ -131,7 +142,8 @@ struct Buffers {
     planes: Buffer,
 }
 
-/// The maps' matrices for casters, at a distance of `stride` bytes, and the bind group that shows one of them.
+/// The matrices with which casters are drawn into the maps, one every `stride` bytes, and the bind
+/// group that shows one of them.
 #[derive(Debug)]
 pub(crate) struct CasterBuffer {
     pub(crate) layout: BindGroupLayout,
@@ -141,7 +153,8 @@ pub(crate) struct CasterBuffer {
     bytes: Vec<u8>,
 }
 
-/// What a map was when it was drawn.
+/// The state with which a map was drawn or is to be drawn. Comparing it with the plan shows whether
+/// the map must be drawn again.
 #[derive(Debug, Default)]
 pub(crate) struct Record {
     pub(crate) place: Option<Place>,
@@ -154,7 +167,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// Whether the map is drawn as it is now.
+    /// Whether the texture holds `map` at `place` exactly as it is planned now.
     fn is_of(&self, map: &ShadowMap, place: Option<Place>) -> bool {
         self.is_drawn
             && self.place == place
@@ -164,7 +177,7 @@ impl Record {
             && self.caster_planes == map.caster_planes
     }
 
-    /// The map's place, if it has one and is to be drawn there.
+    /// The map's place if it has one and must still be drawn there.
     pub(crate) fn stale_place(&self) -> Option<Place> {
         self.place.filter(|_| !self.is_drawn)
     }
@@ -181,10 +194,11 @@ impl Record {
 }
 
 impl Shadows {
-    /// Shadows without any maps, until they are [prepared](Self::prepare).
+    /// Creates shadows without any maps; [`prepare`](Self::prepare) adds the maps.
     ///
     /// # Errors
-    /// A filter that is out of its range.
+    /// [`Error::Invalid`] for a filter with values out of range, and [`Error::Unsupported`] for a
+    /// filter that the device cannot compute (see [`Support`]).
     pub fn new(device: &Device, support: Support, options: &ShadowOptions) -> Result<Self, Error> {
         options
             .filter
@@ -201,7 +215,8 @@ impl Shadows {
             });
         }
         let comparison = match options.comparison {
-            // Its places are single texels.
+            // The places of these filters are single texels, which a bilinear comparison would
+            // blur.
             _ if is_spread => Comparison::PerTexel,
             _ if !support.depth_fetch => Comparison::Hardware,
             comparison => comparison,
@@ -218,7 +233,7 @@ impl Shadows {
             label: Some("shadow sampler"),
             mag_filter: filter_mode,
             min_filter: filter_mode,
-            // Lit is what is not nearer to the light than the limit.
+            // A point is lit if the limit is not farther from the light than the texel.
             compare: compares(&options).then_some(CompareFunction::LessEqual),
             ..SamplerDescriptor::default()
         });
@@ -250,7 +265,8 @@ impl Shadows {
         })
     }
 
-    /// The options, with what the device made of them.
+    /// The options. The comparison is the one in use, which may differ from the requested one (see
+    /// [`Comparison`]).
     pub fn options(&self) -> &ShadowOptions {
         &self.options
     }
@@ -260,15 +276,15 @@ impl Shadows {
         &self.support
     }
 
-    /// What is allowed for beyond what the texels ask for.
+    /// The margin on every comparison beyond the lookup's own bias.
     pub fn bias(&self) -> Bias {
         self.bias
     }
 
-    /// Sets [`bias`](Self::bias), from the next frame that is prepared.
+    /// Sets the [`bias`](Self::bias). The change takes effect with the next frame that is prepared.
     ///
     /// # Errors
-    /// Numbers that are not finite, texels less than −½.
+    /// [`Error::Invalid`] if a value is not finite, or if `bias.texels` is less than −½.
     pub fn set_bias(&mut self, bias: Bias) -> Result<(), Error> {
         if !(bias.texels >= -0.5 && bias.texels.is_finite() && bias.metres.is_finite()) {
             return Err(Error::Invalid {
@@ -280,22 +296,24 @@ impl Shadows {
         Ok(())
     }
 
-    /// WGSL to put before the text of a shader that looks shadows up; `group` is the bind group that
-    /// it takes. All names in it begin with `shadow`, `Shadow` or `SHADOW`. Call
+    /// WGSL text to put before a shader that looks shadows up. `group` is the index of the bind
+    /// group that the text uses. All names in the text begin with `shadow`, `Shadow` or `SHADOW`.
+    /// Call
     ///
     /// ```wgsl
     /// fn shadow_visibility(light: u32, position: vec3f, normal: vec3f) -> f32
     /// ```
     ///
-    /// with a light's index in the plan, a position in render space and the triangle's normal, which
-    /// need not have unit length; in fragment shaders `shadow_normal(position)` makes one. It gives
-    /// the share of the light, 0 to 1, that reaches the point by the maps alone; 1 where no map
-    /// serves it. That a surface facing away from the light is dark is for your shading to say.
-    /// Textures of other filters may take more bindings in the same group.
+    /// with the light's index in the plan, the receiver's position in render space, and the normal
+    /// of its triangle, which need not have unit length. In fragment shaders,
+    /// `shadow_normal(position)` computes this normal. The result is the visibility, from 0 in
+    /// shadow to 1 in full light, as the maps alone give it; it is 1 where no map serves the point.
+    /// Your shading must itself darken surfaces that face away from the light. Filters may use
+    /// further bindings of the same group, so add none of your own to it.
     ///
     /// # WESL
-    /// The text is a module of [WESL](https://wesl-lang.dev) too. Give it a path of its own and
-    /// import from it:
+    /// The text is also a module of [WESL](https://wesl-lang.dev). Add it under a path of your
+    /// choice and import from it:
     ///
     /// ```
     /// # fn main_wgsl(shadows: &umbrage_wgpu::Shadows) -> Result<String, Box<dyn std::error::Error>> {
@@ -314,18 +332,19 @@ impl Shadows {
     /// # Ok(wgsl) }
     /// ```
     ///
-    /// It cannot come as a package that is known at build time: its bindings depend on the device
-    /// ([`Support`]), and its constants on the filter.
+    /// The text cannot be a package that is known at build time, because its bindings depend on the
+    /// device ([`Support`]) and its constants on the filter.
     pub fn lookup_wgsl(&self, group: u32) -> String {
         wgsl::lookup(group, &self.options, self.support.storage_buffers)
     }
 
-    /// As [`lookup_wgsl`](Self::lookup_wgsl), for shaders that look several [`Shadows`] up, say with a
-    /// filter for the sun and another for lamps: `name` and an underscore stand before all names, as
-    /// in `sun_shadow_visibility`, `SunShadowMap` and `SUN_SHADOW_NONE`.
+    /// The text of [`lookup_wgsl`](Self::lookup_wgsl) for shaders that look several [`Shadows`] up,
+    /// for example with one filter for the sun and another for lamps. `name` and an underscore
+    /// stand before all names, as in `sun_shadow_visibility`, `SunShadowMap` and `SUN_SHADOW_NONE`.
     ///
     /// # Errors
-    /// A name other than lower-case letters, digits and underscores behind a letter.
+    /// [`Error::Invalid`] unless `name` begins with a lower-case letter and has only lower-case
+    /// letters, digits and underscores.
     pub fn lookup_wgsl_named(&self, group: u32, name: &str) -> Result<String, Error> {
         let is_letter = |c: char| c.is_ascii_lowercase();
         let is_good = |c: char| is_letter(c) || c.is_ascii_digit() || c == '_';
@@ -338,20 +357,22 @@ impl Shadows {
         Ok(wgsl::named(&self.lookup_wgsl(group), name))
     }
 
-    /// Layout of the bind group that [`lookup_wgsl`](Self::lookup_wgsl) takes, for fragment shaders and, on devices with
-    /// storage buffers, compute shaders.
+    /// Layout of the bind group that [`lookup_wgsl`](Self::lookup_wgsl) uses. It is visible to
+    /// fragment shaders and, on devices with storage buffers, to compute shaders.
     pub fn lookup_layout(&self) -> &BindGroupLayout {
         &self.lookup_layout
     }
 
-    /// The bind group that [`lookup_wgsl`](Self::lookup_wgsl) takes. Ask for it each frame: it changes where the texture does.
+    /// The bind group that [`lookup_wgsl`](Self::lookup_wgsl) uses. Get it anew each frame after
+    /// [`prepare`](Self::prepare), which replaces it when the texture or a buffer has been
+    /// replaced.
     pub fn lookup_bind_group(&self) -> &BindGroup {
         &self.lookup_bind_group
     }
 
-    /// WGSL to put before the text of a shader that draws casters; `group` is the bind group that
-    /// holds the map's matrix, of which [`Prepared::encode`] sets group 0. It declares the same on
-    /// every device, so a shader that is written once is right on all of them:
+    /// WGSL text to put before a shader that draws casters. `group` is the index of the bind group
+    /// that holds the map's matrix; [`Prepared::encode`] sets group 0. The text declares the same
+    /// names on every device, so one shader is correct on all devices:
     ///
     /// ```wgsl
     /// struct ShadowCaster {
@@ -363,11 +384,11 @@ impl Shadows {
     /// @fragment fn shadow_caster_fragment(caster: ShadowCaster) -> @builtin(frag_depth) f32
     /// ```
     ///
-    /// Name your own entry points in pipelines, since the text has some too.
+    /// Name your entry point when you create a pipeline, because the text has entry points too.
     ///
-    /// Casters without holes need a vertex stage alone, which returns `shadow_caster` of a position
+    /// Casters without holes need only a vertex stage, which returns `shadow_caster` of a position
     /// in render space. Give their pipeline the fragment stage that
-    /// [`caster_fragment`](Self::caster_fragment) says:
+    /// [`caster_fragment`](Self::caster_fragment) returns:
     ///
     /// ```wgsl
     /// @vertex fn vertex(@location(0) position: vec3f) -> ShadowCaster {
@@ -375,28 +396,29 @@ impl Shadows {
     /// }
     /// ```
     ///
-    /// Casters with a fragment stage of their own, say to discard holes, hand both `clip` and
-    /// `depth` on in a struct of their own, and write `shadow_fragment_depth` of `depth` as
-    /// `@builtin(frag_depth)`. That is right on every device. Where
-    /// [`caster_needs_fragment`](Self::caster_needs_fragment) is `false` another entry point that
-    /// does not write depth is as right, and faster: devices test depth early then.
+    /// Casters with a fragment stage of their own, which discards holes for example, must pass both
+    /// `clip` and `depth` on in a struct of their own, and must write `shadow_fragment_depth` of
+    /// `depth` as `@builtin(frag_depth)`. Such a stage is correct on every device. Where
+    /// [`caster_needs_fragment`](Self::caster_needs_fragment) is `false`, an entry point that does
+    /// not write depth is also correct, and it is faster because the device can then test depth
+    /// early.
     pub fn caster_wgsl(&self, group: u32) -> String {
         wgsl::caster(group, &self.support)
     }
 
-    /// Whether pipelines that draw casters need a fragment stage that writes depth: `true` on
-    /// devices that do not clamp depths (see [`Support::depth_clip_control`]).
+    /// Whether pipelines that draw casters need a fragment stage that writes depth. This is `true`
+    /// on devices that do not clamp depths (see [`Support::depth_clip_control`]).
     pub fn caster_needs_fragment(&self) -> bool {
         !self.support.depth_clip_control
     }
 
-    /// The fragment stage of a pipeline that draws casters without holes, from a module that begins
-    /// with [`caster_wgsl`](Self::caster_wgsl): the text's own `shadow_caster_fragment`, or `None`
-    /// where the device needs no such stage.
+    /// The fragment stage of a pipeline that draws casters without holes. `module` must begin with
+    /// [`caster_wgsl`](Self::caster_wgsl). The stage is that text's `shadow_caster_fragment`, or
+    /// `None` where the device needs no fragment stage.
     ///
-    /// A vertex stage that gives out the clip position without the depth, and so would be wrong on
-    /// some devices, fails wgpu's validation. In builds with debug assertions it does so on every
-    /// device: those that need no fragment stage get one that does nothing.
+    /// A vertex stage that outputs the clip position without `depth` would be wrong on some
+    /// devices, and there it fails wgpu's validation. In builds with debug assertions it fails on
+    /// every device, because devices that need no fragment stage then get one that does nothing.
     pub fn caster_fragment<'a>(&self, module: &'a ShaderModule) -> Option<FragmentState<'a>> {
         let entry_point = if self.caster_needs_fragment() {
             "shadow_caster_fragment"
@@ -413,20 +435,21 @@ impl Shadows {
         })
     }
 
-    /// Layout of the bind group that [`caster_wgsl`](Self::caster_wgsl) takes: one uniform with a dynamic offset.
+    /// Layout of the bind group that [`caster_wgsl`](Self::caster_wgsl) uses: one uniform buffer
+    /// with a dynamic offset.
     pub fn caster_layout(&self) -> &BindGroupLayout {
         &self.casters.layout
     }
 
-    /// Depth state for pipelines that draw casters. There is no depth bias in it: the lookup has all
-    /// of it.
+    /// Depth state for pipelines that draw casters. It has no depth bias, because the lookup
+    /// applies the whole bias.
     pub fn depth_stencil_state(&self) -> DepthStencilState {
         depth_state(CompareFunction::Less)
     }
 
-    /// Primitive state for pipelines that draw casters: triangles, both sides, depth clamped if the
-    /// device does so. What it leaves to the fragment stage elsewhere,
-    /// [`caster_wgsl`](Self::caster_wgsl) tells.
+    /// Primitive state for pipelines that draw casters: triangle lists without culling of faces,
+    /// with depth clamped if the device can clamp it. On other devices the fragment stage clamps
+    /// depth (see [`caster_wgsl`](Self::caster_wgsl)).
     pub fn primitive_state(&self) -> PrimitiveState {
         PrimitiveState {
             unclipped_depth: self.support.depth_clip_control,
@@ -434,17 +457,20 @@ impl Shadows {
         }
     }
 
-    /// The depths of all maps: a texture of [`DEPTH_FORMAT`], with layers where the layout says so, in which [`place`](Self::place) says where they lie.
+    /// The texture that holds the depths of all maps, in the format [`DEPTH_FORMAT`]. It has
+    /// several layers with [`Layout::Layers`]. [`place`](Self::place) gives the place of each map
+    /// in it.
     pub fn depth_texture(&self) -> &Texture {
         &self.texture.texture
     }
 
-    /// Where a map of the plan lies in the texture; `None` for empty ones.
+    /// The place in the texture of the map with this index in the plan; `None` for an empty map.
     pub fn place(&self, map: usize) -> Option<Place> {
         self.slots.places().get(map).copied().flatten()
     }
 
-    /// Memory of what lookup samples, bytes: of depths, or of a filter's numbers in their place.
+    /// Memory of the textures that lookup samples, bytes: the depth texture or, with a prefilter,
+    /// the prefiltered maps.
     pub fn lookup_bytes(&self) -> u64 {
         self.prefiltering.as_ref().map_or_else(|| self.texture_bytes(), Prefiltering::bytes)
     }
@@ -455,12 +481,20 @@ impl Shadows {
         4 * u64::from(width) * u64::from(height) * u64::from(depth_or_array_layers)
     }
 
-    /// Finds a place for each of a plan's maps, uploads what shaders need, and tells which maps are to be drawn.
-    /// Drop the result and nothing is drawn now, but next time.
+    /// Finds a place for each map of a plan, uploads the data that shaders need, and determines
+    /// which maps must be drawn. If the result is dropped without being encoded, nothing is drawn
+    /// now, and these maps remain to be drawn in the next frame.
     ///
     /// # Errors
-    /// A plan for another filter, maps that a GPU cannot draw, or that do not fit into the device's
-    /// textures; then nothing has changed.
+    /// - [`Error::OtherFilter`] if the plan is for another filter.
+    /// - [`Error::LogarithmicRows`] if a GPU cannot draw a map.
+    /// - [`Error::NoRoom`], or [`Error::Invalid`] with [`Layout::Layers`], if the maps do not fit
+    ///   into the device's textures.
+    /// - [`Error::TooMany`] if a device without storage buffers cannot take as many lights, maps or
+    ///   planes.
+    /// - [`Error::Invalid`] if `frame.render_origin` is not finite.
+    ///
+    /// After an error, the maps that are drawn and the data that shaders read are as before.
     pub fn prepare<'a>(
         &'a mut self,
         device: &Device,
@@ -583,12 +617,13 @@ impl DepthTexture {
         Self { all, layers: layers.collect(), texture, is_fresh: true }
     }
 
-    /// Texels, width and height.
+    /// Width and height, texels.
     pub(crate) fn size(&self) -> [u32; 2] {
         [self.texture.width(), self.texture.height()]
     }
 
-    /// Whether maps that need this much fit, and do not leave most of it unused.
+    /// Whether maps that need this much fit, without leaving more than three quarters of the
+    /// texture unused.
     fn holds(&self, size: [u32; 2], layers: u32) -> bool {
         let Extent3d { width, height, depth_or_array_layers } = self.texture.size();
         let texels =
@@ -600,7 +635,7 @@ impl DepthTexture {
             && has <= 4 * texels(size, layers).max(1)
     }
 
-    /// Size of the texture that will hold maps which need this much.
+    /// Width and height, texels, of the texture that will hold maps which need this much.
     fn size_for(&self, size: [u32; 2], layers: u32) -> [u32; 2] {
         let Extent3d { width, height, .. } = self.texture.size();
         if self.holds(size, layers) { [width, height] } else { size }
@@ -609,7 +644,7 @@ impl DepthTexture {
 
 impl Buffers {
     fn new(device: &Device, support: &Support) -> Self {
-        // Uniform arrays have one size for all.
+        // The arrays in uniform buffers have a fixed length.
         let [lights, maps, planes] =
             if support.storage_buffers { [1; 3] } else { [MAX_LIGHTS, MAX_MAPS, MAX_PLANES] };
         Self {
@@ -620,7 +655,7 @@ impl Buffers {
         }
     }
 
-    /// Grows what is too small for `lookup`; `true` if anything was.
+    /// Replaces the buffers that are too small for `lookup`; `true` if any was replaced.
     fn hold(&mut self, device: &Device, support: &Support, lookup: &Lookup) -> bool {
         let mut has_grown = false;
         let mut hold = |buffer: &mut Buffer, bytes: usize| {
@@ -721,7 +756,7 @@ impl CasterBuffer {
     }
 }
 
-/// The filter that is applied ahead of lookup, if it is one.
+/// The prefilter, if the filter is one.
 fn prefilter(filter: &Filter) -> Option<&Prefilter> {
     match filter {
         Filter::Prefiltered(prefilter) => Some(prefilter),
@@ -734,7 +769,7 @@ fn compares(options: &ShadowOptions) -> bool {
     options.comparison == Comparison::Hardware && prefilter(&options.filter).is_none()
 }
 
-/// What lookup samples.
+/// The texture that lookup samples.
 fn looked_up<'a>(
     depths: &'a DepthTexture,
     prefiltering: Option<&'a Prefiltering>,
@@ -749,7 +784,7 @@ fn view_dimension(layout: Layout) -> TextureViewDimension {
     }
 }
 
-/// Depth state with this comparison.
+/// Depth state with this comparison, without bias.
 pub(crate) fn depth_state(compare: CompareFunction) -> DepthStencilState {
     DepthStencilState {
         format: DEPTH_FORMAT,
@@ -805,7 +840,7 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
     })
 }
 
-/// A buffer of `bytes` that is written from the CPU.
+/// A buffer of this many bytes that the CPU writes.
 fn buffer(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
     device.create_buffer(&BufferDescriptor {
         label: Some("shadows"),
@@ -815,7 +850,7 @@ fn buffer(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
     })
 }
 
-/// Room for `n` elements that lookup reads.
+/// A buffer for `n` elements that lookup reads.
 fn array<T>(device: &Device, support: &Support, n: usize) -> Buffer {
     let usage = if support.storage_buffers { BufferUsages::STORAGE } else { BufferUsages::UNIFORM };
     buffer(device, size_of::<T>() * n, usage)

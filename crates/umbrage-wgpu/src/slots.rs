@@ -1,41 +1,44 @@
-//! Where in the depth texture the maps lie, from frame to frame.
+//! The places of the maps in the depth texture, from frame to frame.
 
 use crate::{Error, Layout, Support};
 use umbrage::visibility::Filter;
 use umbrage::{Atlas, Place, Plan};
 
-/// An atlas in which maps stay where they are while they fit.
+/// An atlas in which maps keep their places while they fit.
 ///
-/// The sizes of a plan's maps change a little whenever the camera moves. Packing them anew each frame would
-/// cost time and memory, and move maps that could stay. So each map has a slot, and is packed anew only where it
-/// outgrows it. The first packing is exact, as sizes may never change; from the second on slots have room to grow.
+/// The sizes of a plan's maps change a little whenever the camera moves. Packing them anew each
+/// frame would cost time and memory, and would move maps that could keep their places. Each map
+/// therefore has a slot, and the maps are packed anew only when one outgrows its slot or the slots
+/// waste too much. The first packing is exact, because sizes may never change. From the second
+/// packing on, slots have room for their maps to grow.
 #[derive(Debug, Default)]
 pub(crate) struct Slots {
     /// Its places are as large as the slots.
     atlas: Atlas,
-    /// As large as the maps.
+    /// The places of the maps themselves, which may be smaller than their slots.
     places: Vec<Option<Place>>,
     was_packed: bool,
     sizes: Vec<[u32; 2]>,
 }
 
-/// Slots are larger than what they hold by one part in this many, at least.
+/// A slot with room is larger than its map by at least one part in this many.
 const ROOM: u32 = 8;
-/// An atlas with more than this many times the texels that it needs is packed anew.
+/// An atlas is packed anew if its slots have more than this many times the texels that their maps
+/// need.
 const WASTE: u64 = 4;
 
 impl Slots {
-    /// Places of the maps, in the plan's order; `None` for empty ones.
+    /// The places of the maps in the order of the plan; `None` for empty maps.
     pub(crate) fn places(&self) -> &[Option<Place>] {
         &self.places
     }
 
-    /// Size and layers of the texture that holds them.
+    /// The size in texels, and the number of layers, of the texture that holds the maps.
     pub(crate) fn size(&self) -> ([u32; 2], u32) {
         (self.atlas.size, self.atlas.layers)
     }
 
-    /// Finds a place for each map; `true` if they were packed anew.
+    /// Finds a place for each map; `true` if the maps were packed anew.
     pub(crate) fn place(
         &mut self,
         plan: &Plan,
@@ -47,7 +50,7 @@ impl Slots {
         self.sizes.extend(plan.maps.iter().map(|m| m.resolution));
         let moves = !self.holds_all() || self.wastes();
         if moves {
-            // Without room rather than not at all.
+            // If slots with room do not fit, slots without room may.
             let roomy = self.was_packed.then(|| self.pack(layout, true, filter, support));
             self.atlas = match roomy {
                 Some(Ok(atlas)) => atlas,
@@ -76,7 +79,8 @@ impl Slots {
     fn wastes(&self) -> bool {
         let texels = |[w, h]: [u32; 2]| u64::from(w) * u64::from(h);
         let slots = self.sizes.iter().zip(&self.atlas.places);
-        // Empty maps may be so for a moment only.
+        // Empty maps do not count, because they may be empty only for a moment and keep their
+        // slots.
         let full =
             slots.filter_map(|(&size, slot)| (!size.contains(&0)).then_some((size, (*slot)?)));
         let [needed, taken] = full.fold([0, 0], |[needed, taken], (size, slot)| {
@@ -94,7 +98,8 @@ impl Slots {
     ) -> Result<Atlas, Error> {
         let max_side = support.max_side;
         let gutter = filter.reach_texels();
-        // What is drawn for a map has sides that are multiples of something, and with them where maps begin.
+        // A slot has the sides of the drawn rectangle less both gutters, so that all maps begin at
+        // multiples of the largest mip level's texel.
         let roomy = |n: u32| {
             let most = max_side.saturating_sub(2 * gutter).max(n);
             (n + n.div_ceil(ROOM)).min(most)
@@ -132,7 +137,7 @@ mod tests {
 
     const SUPPORT: Support = Support { max_side: 1024, max_layers: 4, ..Support::FULL };
 
-    /// Gutters of two texels.
+    /// This filter has gutters of two texels.
     const PCF3: Filter = Filter::Pcf { n: 3 };
 
     #[test]
@@ -169,7 +174,7 @@ mod tests {
         assert!(!place(&mut slots, &[[90, 180], [0, 0], [50, 64]]));
         assert_eq!(slots.places()[0].unwrap().size, [90, 180]);
         assert_eq!(slots.places()[1], None);
-        // Sizes change, as they have just shown: from now on there is room.
+        // The sizes have just changed, so slots have room from now on.
         assert!(place(&mut slots, &[[101, 200], [0, 0], [64, 64]]));
         let before = slots.places().to_vec();
         assert!(!place(&mut slots, &[[110, 210], [0, 0], [64, 70]]));

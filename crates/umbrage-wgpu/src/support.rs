@@ -4,67 +4,72 @@ use wgpu::{
     TextureFormatFeatureFlags, TextureUsages,
 };
 
-/// What a device can do, as far as shadows need it: the one place where that is decided.
+/// The capabilities of a device that shadows depend on. All decisions about fallbacks are made
+/// here:
 ///
-/// | lacking | then |
+/// | missing on the device | consequence |
 /// | --- | --- |
-/// | [`Features::DEPTH_CLIP_CONTROL`] | casters before a map's depths are clamped in the fragment shader, which writes depth: slower, the same picture |
-/// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold 16 lights, 64 maps and 512 planes |
+/// | [`Features::DEPTH_CLIP_CONTROL`] | the fragment shader clamps the depths of casters in front of a map's depth range and writes them: the same picture, but slower |
+/// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold at most 16 lights, 64 maps and 512 planes |
 /// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` for `hard` and `pcf`; [`Error::Unsupported`] for all other filters |
-/// | arrays of any number of layers (OpenGL) | a layer more for 1, 6, 12 … |
-/// | interpolated floats, 16-bit or signed 8-bit textures | [`Error::Unsupported`] for the filters that store their numbers so |
-/// | comparison samplers, where depths cannot be fetched | [`Error::Unsupported`] |
+/// | array textures with any number of layers (OpenGL) | one more layer where 1 or a multiple of 6 are needed |
+/// | interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures | [`Error::Unsupported`] for the prefilters that store their statistics in such textures |
+/// | both comparison samplers and fetching depths | [`Error::Unsupported`] |
 ///
-/// Fields are public so that a fallback can be forced: set one to `false`.
+/// Fields are public so that you can force a fallback by setting a field to `false`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Support {
-    /// Whether the device clamps depths by itself.
+    /// Whether the device can clamp depths to the depth range instead of clipping triangles.
     pub depth_clip_control: bool,
-    /// Whether fragment shaders read storage buffers.
+    /// Whether fragment shaders can read storage buffers.
     pub storage_buffers: bool,
-    /// Whether shaders fetch single depths.
+    /// Whether shaders can fetch single depths.
     pub depth_fetch: bool,
-    /// Whether textures of 32-bit floats are interpolated: for `vsm`, `esm`, `evsm`.
+    /// Whether textures of 32-bit floats can be interpolated, as `vsm`, `esm` and `evsm` need.
     pub float32: bool,
-    /// Whether there are normalised 16-bit textures: for `msm`, and `csm` in 16 bits.
+    /// Whether 16-bit normalised textures can be drawn into and interpolated, as `msm` and the
+    /// 16-bit `csm` need.
     pub norm16: bool,
-    /// Whether signed 8-bit textures can be drawn into: for `csm`.
+    /// Whether signed 8-bit textures can be drawn into and interpolated, as `csm` in 8 bits needs.
     pub snorm8: bool,
-    /// Textures drawn into at a time.
+    /// The greatest number of colour attachments of a pass.
     pub max_attachments: u32,
-    /// Bytes that these take together, a texel.
+    /// The greatest number of bytes per texel that all colour attachments of a pass can have
+    /// together.
     pub max_attachment_bytes: u32,
     /// The longest side of a texture, texels.
     pub max_side: u32,
-    /// Layers of a texture.
+    /// The greatest number of layers of a texture.
     pub max_layers: u32,
-    /// Whether an array texture can have any number of layers. (OpenGL under wgpu takes textures of one layer for plain
-    /// ones, and of six for cubes; such arrays get a layer more.)
+    /// Whether an array texture can have any number of layers. Under OpenGL, wgpu treats a texture
+    /// with one layer as a plain texture, and one with a multiple of six layers as a cube. Such
+    /// arrays therefore get one more layer.
     pub any_layers: bool,
-    /// What offsets into uniform buffers must be multiples of, bytes.
+    /// The number that offsets into uniform buffers must be multiples of, bytes.
     pub uniform_alignment: u32,
 }
 
-/// Storage buffers that lookup takes.
+/// The number of storage buffers that lookup uses.
 const STORAGE_BUFFERS: u32 = 3;
 
 impl Support {
-    /// Features that make shadows faster. Ask for those of them that the adapter has when you create
-    /// your device; none is needed.
+    /// Features that make shadows faster or allow more filters. Request those that the adapter has
+    /// when you create your device. None is required.
     pub const WANTED_FEATURES: Features = Features::DEPTH_CLIP_CONTROL
         .union(Features::FLOAT32_FILTERABLE)
         .union(Features::TEXTURE_FORMAT_16BIT_NORM)
         .union(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
 
-    /// What a device can do that was created from `adapter`.
+    /// The capabilities of `device`, which must have been created from `adapter`.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where shadows are out of its reach.
+    /// [`Error::Unsupported`] if the device cannot compute shadows at all.
     pub fn new(adapter: &Adapter, device: &Device) -> Result<Self, Error> {
         let flags = adapter.get_downlevel_capabilities().flags;
         let features = device.features();
         let mut support = Self::of(features, &device.limits(), flags, adapter.get_info().backend)?;
-        // What the adapter says of a format counts only where the device was asked to heed it.
+        // The format features of the adapter apply only if the device was created with this
+        // feature.
         let is_heeded = features.contains(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
         let can_filter = |format| {
             let can = adapter.get_texture_format_features(format);
@@ -78,17 +83,18 @@ impl Support {
         Ok(support)
     }
 
-    /// The same from what [`new`](Self::new) asks the device, but for formats of textures, of which only an adapter knows.
+    /// The capabilities that follow from the properties which [`new`](Self::new) queries, except
+    /// those of texture formats, which only an adapter knows. `snorm8` is therefore `false`.
     ///
     /// # Errors
-    /// As for [`new`](Self::new).
+    /// [`Error::Unsupported`], as for [`new`](Self::new).
     pub fn of(
         features: Features,
         limits: &Limits,
         flags: DownlevelFlags,
         backend: Backend,
     ) -> Result<Self, Error> {
-        // GLSL has no way to fetch from what it also compares with.
+        // GLSL cannot fetch depths from a texture that it also compares depths with.
         let depth_fetch = backend != Backend::Gl;
         if !depth_fetch && !flags.contains(DownlevelFlags::COMPARISON_SAMPLERS) {
             return Err(Error::Unsupported {
@@ -111,7 +117,7 @@ impl Support {
             depth_fetch,
             float32: features.contains(Features::FLOAT32_FILTERABLE),
             norm16: features.contains(Features::TEXTURE_FORMAT_16BIT_NORM),
-            // Not among what every device has.
+            // Drawing into this format is not guaranteed on every device; only an adapter can tell.
             snorm8: false,
             max_attachments: limits.max_color_attachments.max(1),
             max_attachment_bytes: limits.max_color_attachment_bytes_per_sample,
@@ -122,12 +128,12 @@ impl Support {
         })
     }
 
-    /// What a [`Planner`](umbrage::Planner) must know of the device.
+    /// The limits that a [`Planner`](umbrage::Planner) must know of the device.
     pub fn limits(&self) -> umbrage::Limits {
         umbrage::Limits { max_side: self.max_side, ..umbrage::Limits::default() }
     }
 
-    /// A device that can do all, for tests.
+    /// A device with all capabilities, for tests.
     #[cfg(test)]
     pub(crate) const FULL: Self = Self {
         depth_clip_control: true,
@@ -144,7 +150,7 @@ impl Support {
         uniform_alignment: 256,
     };
 
-    /// How many layers an array texture gets that needs so many.
+    /// The number of layers of an array texture in which `needed` layers are used.
     pub(crate) fn array_layers(&self, needed: u32) -> u32 {
         let needed = needed.max(1);
         let is_odd = needed == 1 || needed.is_multiple_of(6);

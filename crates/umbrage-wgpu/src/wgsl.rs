@@ -1,14 +1,15 @@
-//! Shader text: the modules that a device, a filter and a bind group need, one after another.
+//! The text of shaders: the modules that a device, a filter and a bind group need, one after
+//! another.
 //!
-//! `wgsl/` is a WESL package (see `wesl.toml`): its files are valid by themselves, and editors
-//! follow their imports. Files in one folder are alternatives that declare the same names. Imports
-//! name one of them, and the functions here choose which of them a shader gets. Constants and
-//! straight-line code that depend on options are written by Rust; the package has an example of
-//! each module that is.
+//! `wgsl/` is a WESL package (see `wesl.toml`). Its files are valid by themselves, and editors
+//! follow their imports. Files in one folder are alternatives that declare the same names; imports
+//! name one of them, and the functions in this module choose the one that a shader gets. Constants
+//! and straight-line code that depend on options are written by Rust. The package has an example of
+//! each module that is written so.
 //!
-//! Names are unique, so the texts of modules without their imports make plain WGSL. WESL's compiler
-//! would make the same of them, and the tests compare with it. Users of this library do not need it,
-//! and it takes minutes to build.
+//! All names are unique, so the texts of the modules without their imports are plain WGSL. WESL's
+//! compiler would produce the same, and the tests compare both. Users of this library do not need
+//! that compiler, which takes minutes to build.
 
 mod generated;
 
@@ -20,8 +21,8 @@ use std::ops::Range;
 use umbrage::visibility::statistic::Statistic;
 use umbrage::visibility::{Blur, Filter, Footprint, Pattern, Prefilter, Width};
 
-/// The most that a device without storage buffers can be told of: lengths of the arrays in
-/// `buffers/uniform.wesl`.
+/// The greatest numbers of elements on a device without storage buffers: the lengths of the arrays
+/// in `buffers/uniform.wesl`.
 pub(crate) const MAX_LIGHTS: usize = 16;
 pub(crate) const MAX_MAPS: usize = 64;
 pub(crate) const MAX_PLANES: usize = 512;
@@ -29,12 +30,12 @@ pub(crate) const MAX_PLANES: usize = 512;
 /// A module of the package.
 #[derive(Clone, Debug)]
 struct Module {
-    /// Its file is `wgsl/PATH.wesl`.
+    /// The file of the module is `wgsl/PATH.wesl`.
     path: &'static str,
     text: Cow<'static, str>,
 }
 
-/// A file of the package as it is.
+/// A module whose text is a file of the package.
 macro_rules! module {
     ($path:literal) => {
         Module { path: $path, text: include_str!(concat!("wgsl/", $path, ".wesl")).into() }
@@ -49,7 +50,7 @@ struct Shader {
 }
 
 impl Shader {
-    /// A shader of which `root` imports all other modules, some through others.
+    /// A shader whose module `root` imports all other modules, directly or through others.
     fn new(root: Module) -> Self {
         Self { modules: vec![root], constants: String::new() }
     }
@@ -58,8 +59,8 @@ impl Shader {
         self.modules.extend(modules);
     }
 
-    /// Declares a constant, whose value is given as WGSL's literals are written. It has no type, so
-    /// that arithmetic between constants is as exact as between literals.
+    /// Declares a constant, with the value written as a WGSL literal. It has no type, so that
+    /// arithmetic between constants is as exact as between literals.
     fn constant(&mut self, name: &str, value: impl Debug) {
         self.constants += &format!("const {name} = {value:?};\n");
     }
@@ -70,12 +71,12 @@ impl Shader {
         modules.chain([("constants", self.constants.as_str())])
     }
 
-    /// Plain WGSL.
+    /// The shader as plain WGSL.
     fn link(&self) -> String {
         let mut linked = String::new();
         for (path, text) in self.modules() {
             linked += &format!("// {path}.wesl of umbrage-wgpu\n");
-            // An import is one line.
+            // Every import is one line.
             for line in text.lines().filter(|line| !line.starts_with("import ")) {
                 linked += line;
                 linked.push('\n');
@@ -90,8 +91,8 @@ pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool)
     lookup_shader(group, options, storage_buffers).link()
 }
 
-/// A shader's text with `name` put before the names in it, all of which begin with `shadow`, `Shadow`
-/// or `SHADOW`: `shadow_normal` becomes `sun_shadow_normal`, `ShadowMap` becomes `SunShadowMap`.
+/// A shader's text with `name` before all names that begin with `shadow`, `Shadow` or `SHADOW`:
+/// `shadow_normal` becomes `sun_shadow_normal`, and `ShadowMap` becomes `SunShadowMap`.
 pub(crate) fn named(text: &str, name: &str) -> String {
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let capital = name.chars().take(1).map(|c| c.to_ascii_uppercase());
@@ -171,12 +172,12 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
     shader
 }
 
-/// The texels that a filter's width covers.
+/// Adds the module that computes how many texels a filter's width covers.
 fn add_width(shader: &mut Shader, filter: &Filter) {
     let width = match filter {
         Filter::Hard | Filter::Pcf { .. } => None,
         Filter::Spread { width, .. } => Some(*width),
-        // It multiplies the metric of a metre with widths in metres.
+        // The filter multiplies the metric of one metre by its own widths in metres.
         Filter::Pcss { .. } => Some(Width::Metres(1.0)),
         Filter::Prefiltered(prefilter) => match prefilter.blur {
             Blur::Texels(_) => None,
@@ -194,22 +195,24 @@ fn add_width(shader: &mut Shader, filter: &Filter) {
     }]);
 }
 
-/// How far from a receiver the filter reads texels, as far as lookups with smooth normals allow for
-/// it: to the middle of the farthest texel.
+/// Declares the distance from a receiver to the centre of the farthest texel that the filter reads,
+/// in texels plus widths. Lookups with smooth normals allow for the lean of the normal over this
+/// distance.
 fn add_reach(shader: &mut Shader, filter: &Filter) {
     const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let [texels, widths] = match filter {
         Filter::Hard => [HALF_DIAGONAL, 0.0],
         Filter::Pcf { n } => [HALF_DIAGONAL * ((*n).clamp(1, Filter::MAX_PCF) + 1) as f32, 0.0],
         Filter::Spread { .. } => [HALF_DIAGONAL, HALF_DIAGONAL],
-        // Their widths follow from what they find.
+        // The widths of these filters depend on what they find in the map, so a fixed distance
+        // stands for them.
         Filter::Pcss { .. } | Filter::Prefiltered(_) => [4.0, 0.0],
     };
     shader.constant("SHADOW_REACH", texels);
     shader.constant("SHADOW_REACH_IN_WIDTHS", widths);
 }
 
-/// Comparisons over a square or a disc, n² of them.
+/// Adds the comparisons at n² places of a square or a disc.
 fn add_square(shader: &mut Shader, filter: &Filter, n: u32, pattern: Pattern) {
     let (n, pattern) = match pattern {
         Pattern::Grid => (n.clamp(1, Filter::MAX_PCF), module!("pattern/grid")),
@@ -225,7 +228,7 @@ fn add_square(shader: &mut Shader, filter: &Filter, n: u32, pattern: Pattern) {
     shader.add([module!("square"), pattern]);
 }
 
-/// A lookup of numbers that were filtered ahead of it.
+/// Adds the lookup of a prefiltered map.
 fn add_prefiltered(shader: &mut Shader, prefilter: &Prefilter) {
     let filter = Filter::Prefiltered(*prefilter);
     shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
@@ -257,13 +260,13 @@ fn add_prefiltered(shader: &mut Shader, prefilter: &Prefilter) {
     add_statistic(shader, &prefilter.statistic);
 }
 
-/// Textures that a statistic's numbers take, at most four to each.
+/// The number of texture layers that a statistic takes, with at most four channels in each.
 pub(crate) fn textures(statistic: &Statistic) -> u32 {
     statistic.channels().div_ceil(4) as u32
 }
 
-/// `shadow_encode` and `shadow_reconstruct` of a statistic, and what they need. The modules are
-/// twins of the files of the same name in `umbrage::visibility::statistic`.
+/// Adds `shadow_encode` and `shadow_reconstruct` of a statistic, with the functions that they need.
+/// These modules mirror the files of the same name in `umbrage::visibility::statistic`.
 fn add_statistic(shader: &mut Shader, statistic: &Statistic) {
     shader.constant("SHADOW_TEXTURES", textures(statistic));
     match statistic {
@@ -300,7 +303,7 @@ fn add_statistic(shader: &mut Shader, statistic: &Statistic) {
     }
 }
 
-/// A constant array.
+/// A constant array of vectors, as WGSL text.
 fn vectors(vectors: &[[f32; 2]]) -> String {
     let elements: Vec<_> = vectors.iter().map(|[x, y]| format!("vec2f({x:?}, {y:?})")).collect();
     format!("array<vec2f, {}>({})", vectors.len(), elements.join(", "))
@@ -309,17 +312,17 @@ fn vectors(vectors: &[[f32; 2]]) -> String {
 /// A pass of a prefilter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PrefilterPass {
-    /// From depths to numbers.
+    /// Turns depths into statistics.
     Encode,
     /// Blurs along rows.
     Rows,
     /// Blurs along columns.
     Columns,
-    /// Into a copy of half the resolution.
+    /// Draws a mip level from the one with twice its resolution.
     Halve,
 }
 
-/// The text of a pass that writes those in `range` of the textures that the numbers take.
+/// The text of a pass that writes the textures in `range` among those that a statistic takes.
 pub(crate) fn prefilter(prefilter: &Prefilter, pass: PrefilterPass, range: Range<u32>) -> String {
     prefilter_shader(prefilter, pass, range).link()
 }
@@ -353,7 +356,7 @@ fn prefilter_shader(prefilter: &Prefilter, pass: PrefilterPass, range: Range<u32
     shader
 }
 
-/// The text that a caster's shader takes, with its binding in bind group `group`.
+/// The text for shaders that draw casters, with its binding in bind group `group`.
 pub(crate) fn caster(group: u32, support: &Support) -> String {
     caster_shader(group, support).link()
 }
@@ -364,7 +367,8 @@ fn caster_shader(group: u32, support: &Support) -> Shader {
     shader
 }
 
-/// The text of plain meshes, with the map in bind group 0 and the mask in group 1.
+/// The text of the shader of [`MeshCasters`](crate::MeshCasters), with the map in bind group 0 and
+/// the mask in bind group 1.
 pub(crate) fn mesh(support: &Support, is_masked: bool) -> String {
     mesh_shader(support, is_masked).link()
 }

@@ -1,4 +1,5 @@
-//! What an example needs of wgpu that has nothing to do with shadows: a device, a picture to draw into, a PNG.
+//! The parts of an example that use wgpu but have nothing to do with shadows: a device, a picture
+//! to draw into, and a PNG file.
 
 use std::error::Error;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -7,7 +8,7 @@ use wgpu::{TextureFormat, TextureUsages};
 /// Format of the picture.
 pub(crate) const COLOR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 
-/// A picture and its depths, on a device.
+/// A picture and its depth buffer on a device.
 pub(crate) struct Target {
     size: wgpu::Extent3d,
     color: wgpu::Texture,
@@ -15,7 +16,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// Width times four must be a multiple of 256.
+    /// The width of the picture times four must be a multiple of 256.
     pub(crate) fn new(device: &wgpu::Device, [width, height]: [u32; 2]) -> Self {
         let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         let texture = |format| {
@@ -33,7 +34,7 @@ impl Target {
         Self { size, color: texture(COLOR_FORMAT), depth: texture(TextureFormat::Depth32Float) }
     }
 
-    /// A pass that draws into it, over a sky.
+    /// A pass that draws into the picture over a sky.
     pub(crate) fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -57,7 +58,7 @@ impl Target {
         })
     }
 
-    /// Submits, waits, and writes the picture.
+    /// Submits the commands, waits for them, and writes the picture to a file.
     pub(crate) fn finish(
         &self,
         device: &wgpu::Device,

@@ -1,13 +1,14 @@
 //! Modules whose length depends on options, which Rust therefore writes.
 //!
-//! The outputs of a pass need it: WGSL has no arrays of them. The blur could be a loop over a
-//! constant array of weights, which gives the same bits. But it takes some 10% longer on lavapipe,
-//! and naga adds a counter to every loop to bound it. Samples are straight-line code likewise.
+//! The outputs of a pass must be written this way, because WGSL has no arrays of outputs. The blur
+//! could be a loop over a constant array of weights, which gives the same bits. The loop takes some
+//! 10% longer on lavapipe, however, and naga adds a counter to every loop to bound it. Samples are
+//! straight-line code for the same reason.
 
 use super::Module;
 use std::ops::Range;
 
-/// Where a blur is separable it is done along one axis after the other.
+/// The axis of one of the two passes of a separable blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Axis {
     /// Along s.
@@ -16,7 +17,7 @@ pub(super) enum Axis {
     Columns,
 }
 
-/// `shadow_sample`: as many samples as there are textures.
+/// `shadow_sample`: one sample of each texture of the statistics.
 pub(super) fn samples(textures: u32) -> Module {
     let mut text = "\
 import package::constants::SHADOW_TEXTURES;
@@ -35,7 +36,8 @@ fn shadow_sample(at: vec2f, first: u32, lod: f32) -> array<vec4f, SHADOW_TEXTURE
     Module { path: "samples", text: (text + "    );\n}\n").into() }
 }
 
-/// `shadow_blurred`: the sum of texels times `weights`, the first of which is the middle one's.
+/// `shadow_blurred`: the sum of texels times `weights`. The first weight is that of the middle
+/// texel.
 pub(super) fn taps(axis: Axis, weights: &[f32]) -> Module {
     let mut text = format!(
         "\
@@ -59,7 +61,8 @@ fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {{
     Module { path: "blurred/taps", text: (text + "    return sum;\n}\n").into() }
 }
 
-/// What a pass draws into of a texel's numbers: `textures` of them.
+/// `shadow_outputs` of the pass that encodes: the given `textures` of those that a texel's
+/// statistics take.
 pub(super) fn encoded_outputs(textures: Range<u32>) -> Module {
     let values = textures.clone().map(|t| format!("numbers[{t}]"));
     let text = outputs(
@@ -71,7 +74,7 @@ pub(super) fn encoded_outputs(textures: Range<u32>) -> Module {
     Module { path: "encoded_outputs", text: text.into() }
 }
 
-/// What a pass draws into of blurred numbers: `textures` of them.
+/// `shadow_outputs` of a pass that blurs: the given `textures` of those that the statistics take.
 pub(super) fn blurred_outputs(textures: Range<u32>) -> Module {
     let values = textures.clone().map(|t| format!("shadow_blurred(at, layer + {t}u)"));
     let text = outputs(
@@ -83,7 +86,7 @@ pub(super) fn blurred_outputs(textures: Range<u32>) -> Module {
     Module { path: "blurred_outputs", text: text.into() }
 }
 
-/// A struct with a member for each texture, as WGSL has no arrays of outputs.
+/// A struct with a member for each texture, because WGSL has no arrays of outputs.
 fn outputs(
     import: &str,
     count: usize,

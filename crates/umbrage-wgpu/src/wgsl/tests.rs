@@ -54,7 +54,7 @@ fn every_pass_of_a_prefilter_is_valid() {
     }
 }
 
-/// A user's shader: everything that may be called is, from a fragment shader.
+/// A user's shader: a fragment shader that calls every public function of the lookup.
 const USER: &str = "
     @fragment
     fn user(@location(0) position: vec3f, @location(1) normal: vec3f) -> @location(0) vec4f {
@@ -126,7 +126,7 @@ fn nothing_pollutes_a_users_names() {
     }
 }
 
-/// Offsets and size of a struct as naga lays it out.
+/// The offsets and the size of a struct as naga lays it out.
 fn layout(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
     let found = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name));
     let (_, ty) = found.unwrap_or_else(|| panic!("no struct {name}"));
@@ -219,7 +219,7 @@ fn arrays_of_uniform_buffers_are_as_long_as_is_checked() {
     assert_eq!(lengths, [MAX_LIGHTS, MAX_MAPS, MAX_PLANES]);
 }
 
-/// Of shaders with the same modules, the first.
+/// The first of all shaders that have the same modules.
 fn unlike(shaders: impl Iterator<Item = Shader>) -> Vec<Shader> {
     let mut known = BTreeSet::new();
     let is_new =
@@ -251,7 +251,7 @@ fn shaders() -> Vec<Shader> {
     unlike(shaders.into_iter())
 }
 
-/// Paths of all modules of the package.
+/// The paths of all modules of the package.
 fn package() -> Vec<String> {
     fn visit(folder: &Path, prefix: &str, paths: &mut Vec<String>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -277,7 +277,7 @@ fn module_path(path: &str) -> ModulePath {
     format!("package::{}", path.replace('/', "::")).parse().unwrap()
 }
 
-/// All that WESL's compiler links to a root: whole modules, without new names.
+/// All modules that WESL's compiler links to a root, whole and without renaming.
 fn wesl_linked(resolver: impl Resolver, root: &str) -> TranslationUnit {
     let mut compiler = Wesl::new("").set_custom_resolver(resolver);
     let options = CompileOptions { strip: false, lazy: false, ..CompileOptions::default() };
@@ -308,7 +308,7 @@ fn shaders_are_linked_as_by_wesl() {
         let mut resolver = VirtualResolver::new();
         for (path, text) in shader.modules() {
             used.insert(path.to_owned());
-            // It stands for its alternatives too.
+            // The module stands for its alternatives too.
             let folder = path.split_once('/').map(|(folder, _)| format!("{folder}/"));
             let is_same = |other: &&String| match &folder {
                 Some(folder) => other.starts_with(folder),
@@ -323,12 +323,12 @@ fn shaders_are_linked_as_by_wesl() {
         let linked: TranslationUnit = shader.link().parse().unwrap();
         assert_eq!(declarations(&linked), declarations(&expected), "{root}");
     }
-    // Drawn by another file.
+    // The module `clear` is used by `passes.rs`, which includes its file directly.
     used.insert("clear".to_owned());
     assert_eq!(used, package.into_iter().collect());
 }
 
-/// What Rust writes has an example in the package.
+/// Every module that Rust writes has an example in the package.
 #[test]
 fn examples_are_what_is_generated() {
     let file = |path| fs::read_to_string(folder().join(path).with_extension("wesl")).unwrap();

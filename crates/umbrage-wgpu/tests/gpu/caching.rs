@@ -1,4 +1,4 @@
-//! What is drawn again, and what is not.
+//! Which maps are drawn again in a new frame, and which are not.
 
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
@@ -17,7 +17,7 @@ fn technique() -> Technique {
     Technique { partition: Partition::slices(3), size, ..Technique::default() }
 }
 
-/// Which maps a frame draws.
+/// The indices of the maps that a frame draws.
 fn drawn(bench: &Bench, shadows: &mut Shadows, plan: &Plan, casters: Casters<'_>) -> Vec<usize> {
     let frame = Frame { plan, render_origin: plan.origin, casters };
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
@@ -55,7 +55,8 @@ fn what_moves_is_drawn_into_the_maps_it_casts_into() {
         let plan = plan(&camera(EYE), &[sun()], &technique());
         drawn(&bench, &mut shadows, &plan, Casters::Unmoved);
         let around = |p: DVec3| Aabb::around([p - DVec3::splat(0.01), p + DVec3::splat(0.01)]);
-        // Before the last slice's ground, and out of the way of all.
+        // The box at `far` lies in front of the ground of the last slice. The box `away` lies out
+        // of the way of all maps.
         let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
         let into: Vec<usize> = (0..3).filter(|&i| plan.maps[i].may_cast(around(far))).collect();
         assert!(!into.is_empty() && into.len() < 3, "{into:?}");
@@ -77,7 +78,7 @@ fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
     assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
 }
 
-/// Redrawing one map of an atlas clears that map and leaves the others.
+/// Redrawing one map of an atlas clears that map and keeps the others.
 #[needs(gpu)]
 #[test]
 fn a_map_that_is_redrawn_leaves_its_neighbours() {
@@ -126,7 +127,8 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
     assert_eq!(frame(Casters::MovedIn(&boxes), false), expected);
 }
 
-/// Ever other views: sizes change all the time, and what moves the texture is drawn anew.
+/// When the camera moves all the time, the sizes of the maps change all the time. Few new textures
+/// must suffice, and the maps must be drawn anew in each.
 #[needs(gpu)]
 #[test]
 fn a_camera_that_wanders_needs_few_textures() {
@@ -159,7 +161,8 @@ fn a_camera_that_wanders_needs_few_textures() {
     assert!(shadows.texture_bytes() < 4 * 4 * 128 * 128 * 2, "{}", shadows.texture_bytes());
 }
 
-/// A camera that sees nothing gets no maps, no pass, and full light; then it sees again.
+/// A camera that sees nothing gets no maps and no pass. When it sees something again, its maps are
+/// drawn.
 #[needs(gpu)]
 #[test]
 fn empty_maps_cost_nothing() {

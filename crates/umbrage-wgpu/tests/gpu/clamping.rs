@@ -1,4 +1,5 @@
-//! Casters before a map's depths, with and without the device's help.
+//! Casters in front of a map's depth range, on devices that clamp depths and on devices that do
+//! not.
 
 use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::cast_slice;
@@ -17,18 +18,18 @@ const POSITIONS: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     attributes: &wgpu::vertex_attr_array![0 => Float32x3],
 };
 
-/// Who draws the casters.
+/// The pipeline that draws the casters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Drawn {
     Meshes,
     /// A vertex stage of the user's own.
     OwnVertex,
-    /// A fragment stage as well.
+    /// A vertex stage and a fragment stage of the user's own.
     OwnFragment,
 }
 
-/// Casters of the user's own, without a fragment stage: one text for all devices. [`corner`] adds the
-/// function `corner`.
+/// Casters of the user's own without a fragment stage, with one text for all devices. [`corner`]
+/// adds the function `corner`.
 const OWN_VERTEX: &str = "
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> ShadowCaster {
@@ -36,7 +37,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> ShadowCaster {
 }
 ";
 
-/// With a fragment stage.
+/// The same casters with a fragment stage.
 const OWN_FRAGMENT: &str = "
 struct Own {
     @builtin(position) clip: vec4f,
@@ -59,7 +60,7 @@ fn fragment(in: Own) -> @builtin(frag_depth) f32 {
 }
 ";
 
-/// A function of WGSL that gives the corners of these triangles in render space.
+/// The text of a WGSL function that returns the corners of these triangles in render space.
 fn corner(triangles: &[Vec3], origin: DVec3) -> String {
     let corners = triangles.iter().map(|p| {
         let p = (p.as_dvec3() - origin).as_vec3();
@@ -75,8 +76,8 @@ fn corner(triangles: &[Vec3], origin: DVec3) -> String {
     )
 }
 
-/// The depths of all maps over a plain, with a slanted sheet that reaches from the ground far above
-/// everything.
+/// The depths of all maps over a plain with a slanted sheet that reaches from the ground to far
+/// above everything else.
 fn depths(emulated: bool, warp: Warp, drawn: Drawn) -> Vec<f32> {
     let bench = bench();
     assert!(bench.support.depth_clip_control, "the device can do both");
@@ -120,7 +121,7 @@ fn depths(emulated: bool, warp: Warp, drawn: Drawn) -> Vec<f32> {
     });
     assert_eq!(maps, 2);
     bench.finish(encoder);
-    // And they are where rays find them.
+    // The depths must also be those that rays find.
     let (depths, width) = bench.depths(&shadows, 0);
     let [a, b, c] = [3, 4, 5].map(|i| triangles[i].as_dvec3());
     let normal = (b - a).cross(c - a);
@@ -159,7 +160,8 @@ fn ground(beam: &umbrage::Beam) -> Option<DVec3> {
     Some(beam.origin + beam.direction * t).filter(|p| p.x.abs() < 10.0)
 }
 
-/// Native and emulated depths are the same, to what interpolation in single precision makes of them.
+/// Depths that the device clamps and depths that the fragment stage clamps are equal up to the
+/// rounding of interpolation in single precision.
 fn agree(warp: Warp, drawn: Drawn) {
     let [native, emulated] = [false, true].map(|emulated| depths(emulated, warp, drawn));
     assert_eq!(native.len(), emulated.len());
@@ -185,8 +187,8 @@ fn one_shader_of_the_users_own_is_right_on_all_devices() {
     }
 }
 
-/// A vertex stage that drops the caster's depth is refused by devices that need it, and by all of
-/// them in builds with debug assertions.
+/// A vertex stage that does not output the caster's depth is refused by devices that need the
+/// depth, and by all devices in builds with debug assertions.
 #[needs(gpu)]
 #[test]
 fn a_caster_without_its_depth_is_an_error() {

@@ -1,4 +1,4 @@
-//! The cookbook's recipes, run in a scene whose shadows are known: boxes on a plain.
+//! The cookbook's recipes, run in a scene with known shadows: boxes on a plain.
 #![expect(unreachable_pub, reason = "recipes are written as a module of a user's own")]
 
 #[path = "../../cookbook/custom_casters.rs"]
@@ -41,7 +41,8 @@ fn shadows(bench: &Bench, technique: &Technique) -> Shadows {
     Shadows::new(&bench.device, bench.support, &options).unwrap()
 }
 
-/// A box that a joint lifts aside casts where the joint puts it, not where its mesh lies.
+/// A box that a joint lifts aside casts its shadow from the place to which the joint moves it, not
+/// from the place of its mesh.
 #[needs(gpu)]
 #[test]
 fn skinned_casters_cast_where_they_are_posed() {
@@ -53,7 +54,7 @@ fn skinned_casters_cast_where_they_are_posed() {
     let joints = [Mat4::IDENTITY, Mat4::from_translation(moved.as_vec3())];
     let (layout, group) = kitchen.uniform(cast_slice(&joints));
     let pipeline = custom_casters::skinned_casters(&bench.device, &shadows, &layout);
-    // The plain has joint 0, the box joint 1.
+    // The plain has joint 0, and the box has joint 1.
     let vertices: Vec<(Vec3, u32)> = [(plain(), 0), (box_at(DVec3::ZERO), 1)]
         .into_iter()
         .flat_map(|(mesh, joint)| mesh.into_iter().map(move |position| (position, joint)))
@@ -100,9 +101,9 @@ fn deferred_shading_gives_the_same_shadows() {
     kitchen.check(&picture, &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
 }
 
-/// A dome of flat triangles with the smooth normals of a sphere: with these its own facets shadow it.
-/// The triangles' own normals cure that, and so does a lookup that allows for the difference; neither
-/// lights what the box shadows.
+/// A dome of flat triangles with the smooth normals of a sphere. With these normals, the facets of
+/// the dome shadow themselves. The triangles' own normals prevent this, and so does a lookup that
+/// allows for the difference. Neither method lights the points that the box shadows.
 #[needs(gpu)]
 #[test]
 fn smooth_normals_are_cured() {
@@ -145,7 +146,7 @@ fn two_cameras_have_shadows_of_their_own() {
         bench.finish(encoder);
         (camera, view)
     });
-    // One pipeline looks the maps of either up.
+    // One pipeline looks up the maps of both views.
     let shader = kitchen::shader("shadow_visibility");
     let pipeline = kitchen.pipeline(&views[0].1.shadows, &shader);
     for (camera, view) in &views {
@@ -180,7 +181,7 @@ fn filters_change_at_run_time() {
     }
 }
 
-/// Each slice has a tint of its own, and the overlay shows depths: not all of them 1.
+/// Each slice has a tint of its own, and the overlay shows depths that are not all 1.
 #[needs(gpu)]
 #[test]
 fn maps_are_shown() {
@@ -252,7 +253,8 @@ fn a_resized_picture_has_its_own_errors() {
     let mut texels = |camera: &Camera| {
         planner.plan(camera, &[SUN], &Bounds::default(), &technique).unwrap().texels() as f64
     };
-    // Twice as many pixels each way ask for twice as many texels each way.
+    // A picture with twice as many pixels in each direction needs twice as many texels in each
+    // direction.
     let ratio = texels(&large) / texels(&small);
     assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
     assert_eq!(large.pixel(DVec3::ZERO).map(DVec2::round), Some(DVec2::new(640.0, 360.0)));

@@ -1,4 +1,4 @@
-//! A device that tells of every complaint.
+//! A device that reports every error of wgpu.
 
 use bytemuck::{Pod, bytes_of};
 use std::sync::{Arc, Mutex};
@@ -33,7 +33,7 @@ impl Bench {
         Self { device, queue, support, complaints }
     }
 
-    /// Waits until all is done; fails if wgpu found anything wrong.
+    /// Waits until all commands are done, and panics if wgpu reported an error.
     pub(crate) fn finish(&self, encoder: wgpu::CommandEncoder) {
         self.queue.submit([encoder.finish()]);
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
@@ -49,8 +49,9 @@ impl Bench {
         self.device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
     }
 
-    /// Runs `wgsl`'s entry point `main` on a list of inputs, one invocation each in groups of 64: binding 0 of group 1 is
-    /// the input, binding 1 the output. Group 0 is the lookup's.
+    /// Runs the entry point `main` of `wgsl` on a list of inputs, one invocation for each, in
+    /// workgroups of 64. Binding 0 of group 1 is the input, and binding 1 is the output. Group 0 is
+    /// that of the lookup.
     pub(crate) fn compute<I: Pod, O: Pod>(
         &self,
         shadows: &Shadows,
@@ -126,7 +127,8 @@ impl Bench {
         bytemuck::pod_collect_to_vec(&buffer.get_mapped_range(..).unwrap())
     }
 
-    /// Depths of a layer of the shadows' texture, row by row, and its width.
+    /// The depths of a layer of the shadows' texture, row by row, and the width of the layer in
+    /// texels.
     pub(crate) fn depths(&self, shadows: &Shadows, layer: u32) -> (Vec<f32>, usize) {
         let texture = shadows.depth_texture();
         let [width, height] = [texture.width(), texture.height()];
@@ -162,9 +164,9 @@ impl Bench {
         (rows.collect(), width as usize)
     }
 
-    /// A pipeline of the user's own that draws casters without vertex buffers: `wgsl` with an entry
-    /// point `vertex` and a fragment stage behind the casters' text in group 0. Without a fragment
-    /// stage of its own it takes what the device needs.
+    /// A pipeline of the user's own that draws casters without vertex buffers. `wgsl` has an entry
+    /// point `vertex`, and may have a fragment stage; the casters' text for group 0 stands before
+    /// it. Without a fragment stage of its own, the pipeline uses the one that the device needs.
     pub(crate) fn own_casters(
         &self,
         shadows: &Shadows,
@@ -206,7 +208,7 @@ impl Bench {
         })
     }
 
-    /// A vertex buffer of one instance.
+    /// A vertex buffer with one instance.
     pub(crate) fn instance(&self, instance: CasterInstance) -> wgpu::Buffer {
         self.buffer(bytes_of(&instance), BufferUsages::VERTEX)
     }

@@ -1,4 +1,4 @@
-//! The shaders' functions against the Rust ones, on tables of inputs.
+//! Compares the functions of the shaders with those in Rust on tables of inputs.
 
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, scene};
@@ -37,7 +37,8 @@ struct Point { position: vec3f, light: u32, normal: vec3f, map: u32 }
 @group(1) @binding(0) var<storage, read> points: array<Point>;
 ";
 
-/// Numbers without a pattern, 0 to 1: the hash of O'Neill's PCG output (Jarzynski and Olano 2020), which WGSL computes too.
+/// Pseudo-random numbers: the hash of O'Neill's PCG output (Jarzynski and Olano 2020), which WGSL
+/// computes too. [`unit`] scales it to 0 to 1.
 fn hash(x: u32) -> u32 {
     let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
@@ -56,7 +57,7 @@ fn pcg(x: u32) -> u32 {
 }
 ";
 
-/// Points where receivers may be, seen and unseen, with normals to all sides.
+/// Points at which receivers may lie, inside and outside the view, with normals in all directions.
 fn points(plan: &Plan, count: usize) -> Vec<(DVec3, DVec3)> {
     let camera = camera(EYE);
     let is_receiver = |p: DVec3| p.clamp(scene().min, scene().max) == p;
@@ -88,7 +89,7 @@ const TECHNIQUES: [&str; 8] = [
     "lambda=3@256",
 ];
 
-/// Shadows whose texels hold depths without a pattern, in the gutters as well.
+/// Shadows whose texels hold pseudo-random depths, in the gutters too.
 fn random_depths(
     bench: &Bench,
     shadow_options: &ShadowOptions,
@@ -124,7 +125,7 @@ fn random_depths(
     shadows
 }
 
-/// What the Rust functions say of the same depths.
+/// The visibility that the Rust functions find from the same depths.
 fn expected(shadows: &Shadows, plan: &Plan, light: usize, p: DVec3, n: DVec3) -> f64 {
     let filter = shadows.options().filter;
     let (mut sum, mut shares) = (0.0, 0.0);
@@ -154,13 +155,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
 }";
 
-/// Depths without a pattern make every texel count: whoever looks one texel beside, or mixes up rows, layers, gutters or
-/// weights, is found out. What is left are points on the border of a texel, to single precision.
+/// Pseudo-random depths make every texel count, so a lookup that reads a neighbouring texel or
+/// confuses rows, layers, gutters or weights fails. The only differences allowed are at points that
+/// lie on the border of a texel up to single precision.
 fn agrees(shadow_options: &ShadowOptions, technique: &Technique, origin: Option<DVec3>) {
     agrees_to(2e-3, 500, shadow_options, technique, origin);
 }
 
-/// Visibility is the same to a `tolerance`, but for one point in so many.
+/// Requires the visibility of the shader and that of Rust to agree to a `tolerance`, except at one
+/// point in `one_in`.
 fn agrees_to(
     tolerance: f64,
     one_in: usize,
@@ -172,7 +175,7 @@ fn agrees_to(
     let bench = bench();
     let lights = lights();
     let lights = match technique.filter {
-        // A sun's size is an angle, a lamp's a length.
+        // The size of a sun is an angle, and that of a lamp is a length.
         Filter::Pcss { light: LightSize::Degrees(_), .. } => &lights[..1],
         Filter::Pcss { light: LightSize::Metres(_), .. } => &lights[1..],
         _ if technique.partition.faces == Faces::Whole => &lights[..],
@@ -225,12 +228,13 @@ fn every_filter_and_layout_is_looked_up_as_in_rust() {
         }
         let hard = ShadowOptions { layout, ..Default::default() };
         agrees(&hard, &technique, None);
-        // The nearest texel alone has one depth to compare with, whoever compares.
+        // A single texel has one depth to compare with, so both kinds of comparison must agree.
         agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &technique, None);
     }
 }
 
-/// Widths in pixels and metres, soft shadows: of the many texels that a point compares, one may lie on a border.
+/// Filters with widths in pixels and metres, and soft shadows. Of the many texels that a point is
+/// compared with, one may lie on a border.
 #[needs(gpu)]
 #[test]
 fn comparisons_over_a_width_are_those_of_rust() {
@@ -247,7 +251,8 @@ fn comparisons_over_a_width_are_those_of_rust() {
     }
 }
 
-/// Numbers in smaller and smaller copies, at several places: in single precision, and in 8 bits to what these can tell.
+/// Statistics in several mip levels, sampled at several places. The tolerance is that of single
+/// precision, or for 8 bits that of their resolution.
 #[needs(gpu)]
 #[test]
 fn numbers_over_a_width_are_those_of_rust() {
@@ -273,8 +278,9 @@ fn render_space_may_begin_anywhere_near() {
     agrees(&ShadowOptions::default(), &technique, Some(EYE + DVec3::new(-20.0, 3.0, 11.0)));
 }
 
-/// On receivers that face the light all texels are compared with one depth, so that bilinear comparisons have to give the same
-/// as single ones, but for the eight bits or so that texture units have for weights.
+/// On receivers that face the light, all texels are compared with one depth. Bilinear comparisons
+/// must then give the same visibility as single ones, up to the precision of about eight bits that
+/// texture units have for weights.
 #[needs(gpu)]
 #[test]
 fn hardware_comparisons_weigh_as_single_ones_do() {
@@ -334,7 +340,7 @@ fn receivers_and_weights_are_those_of_rust() {
             let frame =
                 Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Unmoved };
             drop(shadows.prepare(&bench.device, &bench.queue, &frame).unwrap());
-            // Empty maps are left out of what shaders see.
+            // Shaders do not see empty maps.
             let full = plan.maps.iter().enumerate().filter(|(_, m)| !m.is_empty());
             for (index, (place, map)) in full.enumerate() {
                 let table = points(&plan, 400);
@@ -375,7 +381,7 @@ fn receivers_and_weights_are_those_of_rust() {
     }
 }
 
-/// By finite differences along the beam.
+/// The growth of depth per metre along the beam, by finite differences.
 fn depth_per_metre(map: &umbrage::ShadowMap, p: DVec3) -> f64 {
     let st = map.project(p).unwrap().truncate();
     let direction = map.beam(st).unwrap().direction;

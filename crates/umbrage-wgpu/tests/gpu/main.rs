@@ -1,4 +1,4 @@
-//! On a real device, lavapipe where there is no other.
+//! Tests on a real device, or on lavapipe where there is no other.
 
 mod caching;
 mod clamping;
@@ -14,7 +14,7 @@ use umbrage::{
     Aabb, Bounds, Camera, Light, LookAt, Plan, Planner, PointLight, SpotLight, Technique,
 };
 
-/// A view over a plain, with the sun from the left.
+/// A view over a plain.
 pub(crate) fn camera(eye: DVec3) -> Camera {
     Camera::look_at(LookAt {
         eye,

@@ -1,5 +1,5 @@
-//! Filters that are applied ahead of lookup: shader functions against the Rust ones on tables, and whole maps against the
-//! definition, which blurs nothing ahead.
+//! Prefilters: the functions of the shaders are compared with those in Rust on tables of inputs,
+//! and whole maps are compared with the visibility that follows from their definition.
 
 use crate::{EYE, bench, camera, plan, sun};
 use bytemuck::{Pod, Zeroable};
@@ -31,7 +31,7 @@ fn statistics() -> Vec<Statistic> {
     ]
 }
 
-/// The mean of three texels' numbers, as a filter makes it.
+/// The mean of the statistics of three texels, as a filter computes it.
 fn mean(statistic: &Statistic, depths: [f32; 3]) -> Channels {
     let mut mean = [0.0; MAX_CHANNELS];
     for depth in depths {
@@ -48,7 +48,7 @@ fn every_statistic_is_that_of_rust() {
     let inputs: Vec<Input> = (0..4000)
         .map(|i| {
             let at = |k: u32| noise(i * 5 + k) as f32;
-            // Receivers anywhere, also just before and behind what is there.
+            // Receivers lie anywhere, including just in front of and just behind the casters.
             let depths = [at(0), at(1), 0.5 * at(0) + 0.5 * at(2)];
             let receiver = if i % 3 == 0 { depths[0] + 0.02 * (at(3) - 0.5) } else { at(3) };
             Input { depths, receiver }
@@ -80,7 +80,9 @@ fn every_statistic_is_that_of_rust() {
             }}"
         );
         let outputs: Vec<f32> = bench.compute(&shadows, &wgsl, &inputs);
-        // What is ill-conditioned in single precision differs with its last digits: few may. Four moments of a few depths nearly are.
+        // Values that are ill-conditioned in single precision depend on the last digits of their
+        // inputs, so few differences are allowed. For four moments of only three depths, which are
+        // nearly ill-conditioned, more are allowed.
         let mut far = 0;
         for (input, out) in inputs.iter().zip(outputs) {
             let channels = mean(&statistic, input.depths);
@@ -101,8 +103,9 @@ fn every_statistic_is_that_of_rust() {
     }
 }
 
-/// Maps of one even depth, drawn by the user's own pipeline: whatever is encoded, blurred and interpolated gives a step, in every
-/// texel, at the borders as well, beside maps of another depth.
+/// Each map has one depth everywhere, drawn by the user's own pipeline, beside maps with another
+/// depth. Whatever is encoded, blurred and interpolated, visibility must then be a step function of
+/// depth in every texel, also at the borders of the map.
 #[needs(gpu)]
 #[test]
 fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
@@ -134,7 +137,8 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
             ..Technique::default()
         };
         let mut plan = plan(&camera(EYE), &[sun()], &technique);
-        // All of the maps' depths count, not only those of the receivers there would be.
+        // The statistics must cover the whole depth range of the maps, not only the range of
+        // receivers.
         plan.maps.iter_mut().for_each(|m| m.slab = umbrage::Slab::default());
         let frame = Frame { plan: &plan, render_origin: plan.origin, casters: Casters::Moved };
         let mut encoder = bench.encoder();

@@ -1,4 +1,4 @@
-//! What cannot be done is said, and nothing panics.
+//! Requests that cannot be met give errors that name the reason, and nothing panics.
 
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
@@ -53,11 +53,12 @@ fn input_that_makes_no_sense_is_named() {
     let log = Technique { warp: Warp::Log, ..small };
     let error = prepare(&bench, &mut shadows, &log, DVec3::ZERO).unwrap_err();
     assert_eq!(error, Error::LogarithmicRows { map: 0 });
-    // And all is as it was.
+    // After the errors, the shadows work as before.
     prepare(&bench, &mut shadows, &small, DVec3::ZERO).unwrap();
 }
 
-/// A plan for one filter has other casters at its maps' borders, and other depths, than one for another.
+/// Plans for different filters have different casters at the borders of their maps, and different
+/// depths.
 #[needs(gpu)]
 #[test]
 fn a_plan_for_another_filter_is_refused() {
@@ -126,7 +127,7 @@ fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
     assert!(error.to_string().contains("do not fit into 4 layers"), "{error}");
 }
 
-/// On a device that is gone there is nothing to see, but nobody panics.
+/// On a lost device nothing is drawn, and nothing panics.
 #[needs(gpu)]
 #[test]
 fn a_lost_device_does_not_panic() {
