@@ -21,7 +21,8 @@ use std::path::PathBuf;
 
 /// How wrong is which shadow mapping technique, where, and at what price, against ray-traced truth.
 ///
-/// Without a command it compares five techniques on a built-in scene and writes the folder `report`.
+/// Without a command it compares five techniques on a built-in scene and writes the folder
+/// `report`.
 #[derive(Debug, Parser)]
 #[command(
     name = "umbrage",
@@ -113,8 +114,8 @@ pub(crate) struct Figures {
 /// What is done if no command is given.
 const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
 
-/// Parses and checks a command line; its first word is the program's name. Gives the command and how
-/// verbose to be.
+/// Parses and checks a command line; its first word is the program's name. Gives the command and
+/// how verbose to be.
 ///
 /// Clap's own errors come out, those for `--help` and `--version` among them.
 pub(crate) fn parse(

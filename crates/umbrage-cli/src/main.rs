@@ -53,8 +53,8 @@ fn main() -> ExitCode {
     })
 }
 
-/// A layer of Mesa's looks for a desktop to learn which GPU it prefers, and prints an error where there is none. We choose
-/// by ourselves.
+/// A layer of Mesa's looks for a desktop to learn which GPU it prefers, and prints an error where
+/// there is none. We choose by ourselves.
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,

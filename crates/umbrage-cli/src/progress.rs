@@ -15,8 +15,8 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// Steps of the bar for each part of a job.
 const STEPS: u64 = 1000;
 
-/// A bar that appears once a job takes longer than a second, on a terminal. A job has parts that count
-/// alike, and each part has rows of rays.
+/// A bar that appears once a job takes longer than a second, on a terminal. A job has parts that
+/// count alike, and each part has rows of rays.
 pub(crate) struct Bar {
     bar: ProgressBar,
     start: Instant,

@@ -9,7 +9,8 @@ use umbrage::theory::{
 };
 use umbrage::{Error, Faces};
 
-/// E at a point, in units of equations 13 and 14 of Zhang, Zhao and Sun 2009. What is infinite is `null`.
+/// E at a point, in units of equations 13 and 14 of Zhang, Zhao and Sun 2009. What is infinite is
+/// `null`.
 #[derive(Serialize)]
 struct AliasingJson {
     lambda: Option<f64>,

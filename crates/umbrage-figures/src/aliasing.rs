@@ -172,7 +172,8 @@ impl Layout {
         TOP + i as i32 * (self.side_view[1] + GAP)
     }
 
-    /// Left edges: three side views, the map, the picture. The last two are as wide as all are high.
+    /// Left edges: three side views, the map, the picture. The last two are as wide as all are
+    /// high.
     fn column(&self, i: usize) -> i32 {
         let [width, height] = self.side_view;
         let i = i as i32;

@@ -1,6 +1,6 @@
 //! Line charts as SVG, and what every drawing shares, all in one style: Okabe and Ito's colours for
-//! curves, viridis for fields, both safe for the colour-blind; lines for closed forms, markers for what
-//! was measured.
+//! curves, viridis for fields, both safe for the colour-blind; lines for closed forms, markers for
+//! what was measured.
 
 use crate::axis::Axis;
 use anyhow::Result;
@@ -42,8 +42,8 @@ const VIRIDIS: [RGBColor; 9] = [
     RGBColor(253, 231, 37),
 ];
 
-/// One colour of a line chart: a line for the closed form, markers for what was measured, either may
-/// be empty.
+/// One colour of a line chart: a line for the closed form, markers for what was measured, either
+/// may be empty.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     name: String,

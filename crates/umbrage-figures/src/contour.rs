@@ -1,7 +1,8 @@
 //! Lines of equal value of a smooth field, by marching triangles.
 
-/// Segments along which a field has the value `level`, in the field's own coordinates. `values` are on a grid of
-/// `columns` points a row; cells are cut into two triangles, along which the field is taken as flat.
+/// Segments along which a field has the value `level`, in the field's own coordinates. `values` are
+/// on a grid of `columns` points a row; cells are cut into two triangles, along which the field is
+/// taken as flat.
 pub(crate) fn segments(values: &[f64], columns: usize, level: f64) -> Vec<[[f64; 2]; 2]> {
     let rows = values.len() / columns;
     let mut found = Vec::new();

@@ -1,4 +1,5 @@
-//! Convolution shadow maps' figures: the Fourier step and its trade-offs, and what it makes of shadows.
+//! Convolution shadow maps' figures: the Fourier step and its trade-offs, and what it makes of
+//! shadows.
 
 use crate::axis::Axis;
 use crate::chart::{self, Curve, LineChart};
@@ -16,8 +17,9 @@ const PLAIN: StepAt = StepAt { offset: false, scale: false };
 const OFFSET: StepAt = StepAt { offset: true, scale: false };
 const SCALE: StepAt = StepAt { offset: false, scale: true };
 
-/// The shadow test as a map stores it: sines and cosines of the occluder's depth z, rounded to 8 bits with sign,
-/// times those of the receiver's depth d (CSM Eqs. 13 and 14, with the step's sign put right). Before the clamp.
+/// The shadow test as a map stores it: sines and cosines of the occluder's depth z, rounded to 8
+/// bits with sign, times those of the receiver's depth d (CSM Eqs. 13 and 14, with the step's sign
+/// put right). Before the clamp.
 fn from_basis_images(order: u32, attenuation: f64, receiver: f64, occluder: f64) -> f64 {
     let stored = |value: f64| (value * 127.0).round() / 127.0;
     let terms = (1..=order).map(f64::from).map(|k| {
@@ -159,7 +161,8 @@ pub(crate) fn fig3() -> Result<Figure> {
     })
 }
 
-/// Depths in the scene of Fig. 6: the ground, the squares over it, and the slanted polygon's far end.
+/// Depths in the scene of Fig. 6: the ground, the squares over it, and the slanted polygon's far
+/// end.
 const GROUND: f64 = 0.9;
 const LOW: f64 = 0.15;
 const HIGH: f64 = 0.45;

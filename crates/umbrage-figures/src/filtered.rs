@@ -8,7 +8,8 @@ use umbrage::Light;
 use umbrage_measure::{Image, Rgb};
 use umbrage_trace::Tracer;
 
-/// Two trees in low light from the side, whose shadows lie long and thin on the grass, under some techniques.
+/// Two trees in low light from the side, whose shadows lie long and thin on the grass, under some
+/// techniques.
 fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
     let scene = umbrage_scene::builtin("grove", Some(2))?;
     let tracer = Tracer::new(&scene)?;

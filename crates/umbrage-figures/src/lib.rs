@@ -82,8 +82,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FIGURES.iter().map(|(name, _)| *name)
 }
 
-/// Makes the figures of these names, or all if there are none, in the page's order. Each is a part of
-/// the job.
+/// Makes the figures of these names, or all if there are none, in the page's order. Each is a part
+/// of the job.
 ///
 /// # Errors
 /// What the planner, a closed form or a drawing refuses, which would be a mistake in here.

@@ -8,8 +8,8 @@ use umbrage::{
     Bounds, Camera, Faces, Light, LookAt, Partition, Plan, Planner, Size, Technique, Warp,
 };
 
-/// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that of
-/// resolutions left out.
+/// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that
+/// of resolutions left out.
 pub(crate) fn camera(view: View) -> Result<Camera> {
     camera_of(view, 1)
 }
@@ -35,7 +35,8 @@ pub(crate) fn from_behind(theta_rad: f64) -> DVec3 {
     DVec3::new(0.0, -sin, -cos)
 }
 
-/// Maps of one texel for all of a view, in parallel light of this direction, cut into self-similar slices.
+/// Maps of one texel for all of a view, in parallel light of this direction, cut into self-similar
+/// slices.
 pub(crate) fn plan(
     view: View,
     direction: DVec3,
@@ -53,7 +54,8 @@ pub(crate) fn plan(
     Ok(Planner::new().plan(&camera(view)?, &[light], &Bounds::default(), &technique)?.clone())
 }
 
-/// Perspective errors of a plan's first map in the middle of the view at a distance, pixels per texel.
+/// Perspective errors of a plan's first map in the middle of the view at a distance, pixels per
+/// texel.
 pub(crate) fn error_at(plan: &Plan, view: View, z: f64) -> Result<PointError> {
     plan.maps[0]
         .perspective_error(&camera(view)?, DVec3::NEG_Z * z)

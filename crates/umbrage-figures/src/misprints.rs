@@ -134,7 +134,8 @@ fn found() -> Result<Vec<Misprint>> {
     Ok(all)
 }
 
-/// The series of the step that is 1 for d ≤ z, each coefficient a numerical integral over the step's period in z − d.
+/// The series of the step that is 1 for d ≤ z, each coefficient a numerical integral over the
+/// step's period in z − d.
 fn integrated(order: u32, d: f64, z: f64) -> f64 {
     const STEPS: u32 = 100_000;
     let width = 2.0 / f64::from(STEPS);

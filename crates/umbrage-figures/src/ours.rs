@@ -1,5 +1,5 @@
-//! What the papers left open: the worst errors of every warp at any angle of light, and what choosing the warp by
-//! them gains.
+//! What the papers left open: the worst errors of every warp at any angle of light, and what
+//! choosing the warp by them gains.
 
 use crate::axis::Axis;
 use crate::chart::{Curve, LineChart};

@@ -1,4 +1,5 @@
-//! Planned maps in the units and axes of Theory: errors E, and light in the plane of the view's y axis and direction.
+//! Planned maps in the units and axes of Theory: errors E, and light in the plane of the view's y
+//! axis and direction.
 
 use crate::measured;
 use anyhow::{Result, ensure};
@@ -7,8 +8,8 @@ use std::f64::consts::PI;
 use umbrage::theory::{Errors, Rule, View};
 use umbrage::{Camera, Faces, Plan, ShadowMap, Warp};
 
-/// The way of light that comes from above and, for θ < 90°, from before the viewer. V's lower side is where errors
-/// are large then.
+/// The way of light that comes from above and, for θ < 90°, from before the viewer. V's lower side
+/// is where errors are large then.
 pub(crate) fn from_before(theta_rad: f64) -> DVec3 {
     measured::from_behind(PI - theta_rad)
 }
@@ -48,8 +49,8 @@ impl Planned {
         self.map().lambda.unwrap_or(f64::INFINITY)
     }
 
-    /// E_q and E_p at (y, z) in the plane x = 0, from the Jacobian of the map's matrix; NaN where the map does
-    /// not apply.
+    /// E_q and E_p at (y, z) in the plane x = 0, from the Jacobian of the map's matrix; NaN where
+    /// the map does not apply.
     pub(crate) fn errors(&self, y: f64, z: f64) -> Errors {
         let m = self.map().perspective_error(&self.camera, DVec3::new(0.0, y, -z));
         // For an image of one pixel and a map of one texel E is twice m.

@@ -248,8 +248,8 @@ impl Compared<'_> {
     }
 }
 
-/// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that all
-/// share what the camera sees.
+/// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that
+/// all share what the camera sees.
 fn trace(
     view: &View<'_>,
     contenders: &mut [Contender<'_>],

@@ -161,8 +161,8 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// How much light the maps that are rendered let through to points of surfaces that face it, 0 to
-    /// 1 each.
+    /// How much light the maps that are rendered let through to points of surfaces that face it, 0
+    /// to 1 each.
     ///
     /// # Errors
     /// What a GPU refuses, or [`Error::NoMaps`].

@@ -103,8 +103,8 @@ pub struct ReportFolder {
 }
 
 impl ReportFolder {
-    /// Checks, before any work, that a report can be written to `target`: a new folder, an empty one,
-    /// or a former report, which will be replaced.
+    /// Checks, before any work, that a report can be written to `target`: a new folder, an empty
+    /// one, or a former report, which will be replaced.
     ///
     /// # Errors
     /// A folder that holds something else, or that cannot be written.

@@ -1,6 +1,6 @@
 //! Runs shadow techniques on scenes and measures them against ray-traced truth: in one view, in a
-//! motion, in many views. A program, a window or a page says what it wants in plain structs, is told
-//! of the [`Progress`], and gets figures, pictures and reports.
+//! motion, in many views. A program, a window or a page says what it wants in plain structs, is
+//! told of the [`Progress`], and gets figures, pictures and reports.
 //!
 //! ```text
 //! open_scene ──────► PreparedScene ──► Comparison ──► Compared ──► report's folder
@@ -15,12 +15,12 @@
 //! - A [`NamedTechnique`] is a technique and the text that asked for it, by which reports call it.
 //! - [`Executors`] are what there is to render with, a GPU or the reference; a [`RenderScene`] is a
 //!   scene ready for them.
-//! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view, [`sweep()`] in
-//!   many.
+//! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view, [`sweep()`]
+//!   in many.
 //!
 //! Nothing here prints, parses command lines, or asks about the process. What is wrong is an
-//! [`Error`], which names the [`Field`] that it is about; whoever has other words for the fields says
-//! so ([`Error::in_words`]).
+//! [`Error`], which names the [`Field`] that it is about; whoever has other words for the fields
+//! says so ([`Error::in_words`]).
 //!
 //! ```
 //! use std::path::Path;

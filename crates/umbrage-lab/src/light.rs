@@ -8,7 +8,8 @@ use umbrage::Light;
 use umbrage_measure::LightInfo;
 use umbrage_scene::Scene;
 
-/// Light of an afternoon: 45° high, from the side and a little from behind a viewer who looks along −z.
+/// Light of an afternoon: 45° high, from the side and a little from behind a viewer who looks along
+/// −z.
 const AFTERNOON_SUN: DVec3 = DVec3::new(-0.6, -1.0, -0.8);
 
 /// The light that somebody asks for. Left out: the scene's first, else a 45° afternoon sun.

@@ -10,8 +10,8 @@ use umbrage_trace::shade;
 pub struct Shadowed {
     /// The shaded picture.
     pub color: Vec<Rgb>,
-    /// 0 (in shadow) ..= 1 (lit). Over the samples that count, if there are any in a pixel; else over
-    /// all, the sky being lit.
+    /// 0 (in shadow) ..= 1 (lit). Over the samples that count, if there are any in a pixel; else
+    /// over all, the sky being lit.
     pub visibility: Vec<f32>,
 }
 
@@ -29,8 +29,8 @@ impl Shadowed {
 /// Where a map's texels lie on what is seen.
 #[derive(Clone, Debug, Default)]
 pub struct Texels {
-    /// Pixels per texel in the worst direction, the mean over the samples that count; NaN where none
-    /// does or no map serves it.
+    /// Pixels per texel in the worst direction, the mean over the samples that count; NaN where
+    /// none does or no map serves it.
     pub error: Vec<f32>,
     /// Texel coordinates s and t in the middle of the pixel; NaN where no map serves it.
     pub texel: Vec<[f32; 2]>,

@@ -1,7 +1,7 @@
 use umbrage_scene::Scene;
 
-/// Is told how far a job is, on any thread. All that it does not want to hear it may leave out; `()`
-/// hears nothing.
+/// Is told how far a job is, on any thread. All that it does not want to hear it may leave out;
+/// `()` hears nothing.
 ///
 /// A job has parts that count alike, one if nobody says otherwise. Each part has rows: of rays, or
 /// of pixels to measure.

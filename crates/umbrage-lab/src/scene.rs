@@ -8,8 +8,8 @@ use umbrage_scene::{Scene, SceneError, builtins};
 /// `name` or `name:size`.
 ///
 /// # Errors
-/// A name that neither a file nor a built-in scene has; a file that cannot be read or has nothing to
-/// draw.
+/// A name that neither a file nor a built-in scene has; a file that cannot be read or has nothing
+/// to draw.
 pub fn open_scene(folder: &Path, name: &str) -> Result<Scene, Error> {
     let scene = match scene_file(folder, name) {
         Some(path) => umbrage_scene::load(&path)?,
@@ -55,8 +55,8 @@ fn built_in(folder: &Path, name: &str) -> Result<Scene, Error> {
     umbrage_scene::builtin(builtin, size).about(Field::Scene)
 }
 
-/// SHA-256 of a scene's files, one after the other, as hexadecimal digits; `None` where there is none
-/// to be read.
+/// SHA-256 of a scene's files, one after the other, as hexadecimal digits; `None` where there is
+/// none to be read.
 pub(crate) fn digest(folder: &Path, name: &str) -> Option<String> {
     use sha2::{Digest, Sha256};
 

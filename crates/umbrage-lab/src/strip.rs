@@ -10,7 +10,8 @@ use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
 pub const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
      the view's range: there are no shadows to see";
 
-/// Some of a picture's rows, and what the CPU sees there, which is found when it is first asked for.
+/// Some of a picture's rows, and what the CPU sees there, which is found when it is first asked
+/// for.
 pub struct Rows<'a> {
     view: &'a View<'a>,
     range: Range<u32>,

@@ -31,8 +31,8 @@ pub struct SweepOptions {
     pub scenes: Option<PathBuf>,
     /// What to compare, and how finely.
     pub comparison: ComparisonOptions,
-    /// The largest error, pixels per texel, that those techniques were given which do not say how many
-    /// texels they have; results tell it.
+    /// The largest error, pixels per texel, that those techniques were given which do not say how
+    /// many texels they have; results tell it.
     pub max_error: Option<f64>,
     /// What the maps are fitted to.
     pub fit: Fit,
@@ -173,7 +173,8 @@ fn finish(
     Ok(sweep)
 }
 
-/// That the folder is not one of other views altogether; says which of its views are no longer wanted.
+/// That the folder is not one of other views altogether; says which of its views are no longer
+/// wanted.
 fn check_names(
     folder: &SweepFolder,
     options: &SweepOptions,

@@ -40,8 +40,8 @@ impl NamedTechnique {
         self.text.contains('@')
     }
 
-    /// Takes the fewest texels for errors of at most this many pixels per texel, unless the text says
-    /// how many texels there are.
+    /// Takes the fewest texels for errors of at most this many pixels per texel, unless the text
+    /// says how many texels there are.
     pub fn limit_error(&mut self, pixels: f64) {
         if !self.is_sized() {
             self.technique.size = Size::MaxError(pixels);

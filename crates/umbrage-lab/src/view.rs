@@ -117,8 +117,8 @@ impl ChosenView {
     }
 }
 
-/// The view that is asked for. What is left open comes from the scene's camera; a view with an eye and
-/// a target of its own owes the scene only the depth range.
+/// The view that is asked for. What is left open comes from the scene's camera; a view with an eye
+/// and a target of its own owes the scene only the depth range.
 ///
 /// # Errors
 /// A camera that the scene does not have, or a view that no camera can have.
@@ -167,7 +167,8 @@ fn depth_range(look_at: &LookAt, bounds: Aabb) -> [f64; 2] {
     let far = bounds.corners().iter().map(|&c| forward.dot(c - look_at.eye)).fold(0.0, f64::max);
     let far = if far > 0.0 { far * 1.01 } else { 100.0 };
     let distance = look_at.eye.distance(look_at.eye.clamp(bounds.min, bounds.max));
-    // The scene's nearest point may appear in the picture's corner, where depth is less than distance.
+    // The scene's nearest point may appear in the picture's corner, where depth is less than
+    // distance.
     let corner = {
         let tan_y = (look_at.fov_y_rad / 2.0).tan();
         let tan_x = tan_y * f64::from(look_at.image[0]) / f64::from(look_at.image[1]);

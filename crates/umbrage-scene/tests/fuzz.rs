@@ -1,5 +1,5 @@
-//! Damaged files: every small third-party scene, cut short and with bytes changed at hundreds of places,
-//! loads or gets an error, and what loads is sound.
+//! Damaged files: every small third-party scene, cut short and with bytes changed at hundreds of
+//! places, loads or gets an error, and what loads is sound.
 
 mod damage;
 

@@ -146,8 +146,8 @@ impl<'a> View<'a> {
     }
 
     /// Whether the shadow on a surface counts where pictures are compared: it [faces the
-    /// light](Sample::is_facing), and its depth, metres, is within the camera's far distance, beyond
-    /// which no map serves. Whoever found the surface, this decides.
+    /// light](Sample::is_facing), and its depth, metres, is within the camera's far distance,
+    /// beyond which no map serves. Whoever found the surface, this decides.
     pub fn counts(&self, is_facing: bool, depth: f64) -> bool {
         is_facing && depth <= self.camera.far()
     }

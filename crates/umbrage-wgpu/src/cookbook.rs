@@ -1,5 +1,5 @@
-//! Recipes for what a renderer needs beyond the tutorial (the example `renderer`). Each is a file in
-//! the folder `cookbook` of this crate, and a test runs each of them against known shadows.
+//! Recipes for what a renderer needs beyond the tutorial (the example `renderer`). Each is a file
+//! in the folder `cookbook` of this crate, and a test runs each of them against known shadows.
 //!
 //! | you want | recipe |
 //! | --- | --- |
@@ -34,11 +34,11 @@
 #[doc = "```"]
 pub mod custom_casters {}
 
-/// Deferred shading looks shadows up by the position that follows from the viewer's depths and by the
-/// G-buffer's normal. Keep the triangles' own normals there, or see [`smooth_normals`].
+/// Deferred shading looks shadows up by the position that follows from the viewer's depths and by
+/// the G-buffer's normal. Keep the triangles' own normals there, or see [`smooth_normals`].
 ///
-/// Far from the world's origin make `render_from_clip` and `Frame::render_origin` relative to the eye.
-/// Positions then keep their digits.
+/// Far from the world's origin make `render_from_clip` and `Frame::render_origin` relative to the
+/// eye. Positions then keep their digits.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/deferred.rs")]
@@ -52,18 +52,19 @@ pub mod custom_casters {}
 pub mod deferred {}
 
 /// An interpolated normal leans off its triangle's plane. The lookup then expects depths beside the
-/// point that the triangle does not have, and facets shadow themselves where the filter is wide. In the
-/// test's scene, a dome of facets 17 degrees apart under `pcf7`, more than one pixel in a hundred of the
-/// lit dome is dark; with the triangles' own normals, and with the tolerant lookup below, none is.
+/// point that the triangle does not have, and facets shadow themselves where the filter is wide. In
+/// the test's scene, a dome of facets 17 degrees apart under `pcf7`, more than one pixel in a
+/// hundred of the lit dome is dark; with the triangles' own normals, and with the tolerant lookup
+/// below, none is.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/smooth_normals.rs")]
 #[doc = "```"]
 pub mod smooth_normals {}
 
-/// Plans follow the camera, so every view has maps of its own: a planner and [`Shadows`](crate::Shadows)
-/// each. Stable cascades (`uniform(stable)+z4`) do not depend on where the camera looks, but on where it
-/// is; they are no exception.
+/// Plans follow the camera, so every view has maps of its own: a planner and
+/// [`Shadows`](crate::Shadows) each. Stable cascades (`uniform(stable)+z4`) do not depend on where
+/// the camera looks, but on where it is; they are no exception.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/two_cameras.rs")]
@@ -77,8 +78,9 @@ pub mod two_cameras {}
 #[doc = "```"]
 pub mod filter_at_run_time {}
 
-/// `shadow_place(light, position)` tells which map serves a point and where in the map the point lies;
-/// `Plan::lookup` tells it on the CPU, and `Shadows::place` where a map lies in the depth texture.
+/// `shadow_place(light, position)` tells which map serves a point and where in the map the point
+/// lies; `Plan::lookup` tells it on the CPU, and `Shadows::place` where a map lies in the depth
+/// texture.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/show_a_map.rs")]
@@ -91,8 +93,8 @@ pub mod filter_at_run_time {}
 #[doc = "```"]
 pub mod show_a_map {}
 
-/// Lights that share a filter share a plan and a budget of texels. A light with another filter has a
-/// planner and [`Shadows`](crate::Shadows) of its own, and its lookup's names get a prefix.
+/// Lights that share a filter share a plan and a budget of texels. A light with another filter has
+/// a planner and [`Shadows`](crate::Shadows) of its own, and its lookup's names get a prefix.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/filters_per_light.rs")]
@@ -105,7 +107,8 @@ pub mod show_a_map {}
 #[doc = "```"]
 pub mod filters_per_light {}
 
-/// The size of the picture is part of the camera. Nothing of [`Shadows`](crate::Shadows) depends on it.
+/// The size of the picture is part of the camera. Nothing of [`Shadows`](crate::Shadows) depends on
+/// it.
 ///
 #[doc = "```"]
 #[doc = include_str!("../cookbook/resizing.rs")]

@@ -10,8 +10,8 @@
 //! - [`MeshCasters`] draws plain meshes into the maps, alpha-masked ones too. Or draw casters with
 //!   pipelines of your own: a [`MapPass`] gives the matrix, the viewport and the culling,
 //!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states,
-//!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the fragment
-//!   stage that the device needs.
+//!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the
+//!   fragment stage that the device needs.
 //! - The [`cookbook`] has recipes: casters and shading of your own, several cameras, and others.
 //! - [`Support`] says what a device can do, and documents what takes the place of what it cannot
 //!   do.
@@ -34,8 +34,8 @@
 //! # What a frame costs
 //!
 //! A map whose matrix, size and casters are as they were is not drawn again. With
-//! [`Casters::Unmoved`] and a camera that does not move, nothing is encoded at all. Empty maps have no
-//! texels and no pass. Buffers grow and are kept; the texture is made anew only where a map
+//! [`Casters::Unmoved`] and a camera that does not move, nothing is encoded at all. Empty maps have
+//! no texels and no pass. Buffers grow and are kept; the texture is made anew only where a map
 //! outgrows its place in it.
 //!
 //! # Losing the device

@@ -4,8 +4,8 @@
 //!
 //! - A [`Technique`] says which maps there are, how their texels are spread and how they are looked
 //!   up. It is also a text, which parses and prints; [`language`] lists the words.
-//! - A [`Planner`] computes a [`Plan`] for a [`Camera`], its [`Light`]s, the [`Bounds`] of what casts
-//!   and receives shadows, and a technique.
+//! - A [`Planner`] computes a [`Plan`] for a [`Camera`], its [`Light`]s, the [`Bounds`] of what
+//!   casts and receives shadows, and a technique.
 //! - Each [`ShadowMap`] of a plan has its matrix, its resolution, the depth range that it serves,
 //!   planes to cull its casters with, and the error that it has ([`MapError`]). [`aliasing`] tells
 //!   the error at any point.

@@ -23,7 +23,8 @@ pub(crate) struct Compare {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
-    /// Measure flicker too: how often shadows change in a motion where the truth does not; and with `away` noise: how much pixels sparkle.
+    /// Measure flicker too: how often shadows change in a motion where the truth does not; and with
+    /// `away` noise: how much pixels sparkle.
     #[arg(long, value_enum)]
     pub(crate) motion: Option<MotionArg>,
     /// Frames of the motion.
@@ -97,7 +98,8 @@ pub(crate) enum MotionArg {
     Orbit,
     /// The light turns about the vertical, a tenth of a degree a frame.
     Sun,
-    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that more and more texels fall into a pixel.
+    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that
+    /// more and more texels fall into a pixel.
     Away,
 }
 

@@ -63,8 +63,9 @@ pub(crate) enum Aov {
     Texels,
     /// Which map of the plan serves each pixel. EXR: its index, −1 for none.
     Partition,
-    /// How much pixels sparkle while the viewer moves away (8 frames of `compare --motion away`), against supersampled truth. EXR: the mean change of a
-    /// pixel's error from frame to frame, NaN where pixels show more than one surface.
+    /// How much pixels sparkle while the viewer moves away (8 frames of `compare --motion away`),
+    /// against supersampled truth. EXR: the mean change of a pixel's error from frame to frame, NaN
+    /// where pixels show more than one surface.
     Minification,
 }
 

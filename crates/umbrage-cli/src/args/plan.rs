@@ -15,8 +15,8 @@ Examples:
   umbrage plan --eye 0,2,0 --target 0,2,-1 --fov 60 --near 0.1 --far 500 --size 1280x720 \\
       --sun 0.3,-1,0.2 --shadows lispsm@1024 --json")]
 pub(crate) struct Plan {
-    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them). Without one, the whole
-    /// view between --near and --far is served.
+    /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them). Without one, the
+    /// whole view between --near and --far is served.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: Option<String>,
     /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).

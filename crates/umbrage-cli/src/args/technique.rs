@@ -70,8 +70,8 @@ impl ComparisonArgs {
 /// How many texels there are where specifications do not say.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct TexelArgs {
-    /// Take the fewest texels with which none gets wider than PX pixels, before any surface's slope, in
-    /// place of @TEXELS.
+    /// Take the fewest texels with which none gets wider than PX pixels, before any surface's
+    /// slope, in place of @TEXELS.
     #[arg(long, value_name = "PX", value_parser = values::pixels_per_texel, allow_hyphen_values = true)]
     pub(crate) max_error: Option<f64>,
 }

@@ -67,8 +67,8 @@ pub(crate) struct Aliasing {
     pub(crate) warp: Option<Rule>,
     #[command(flatten)]
     pub(crate) tsm: FocusArgs,
-    /// Where, metres in the viewer's eye: x to the right, z along the view, y to the side to which the light
-    /// leans forwards. Errors are largest on the other side.
+    /// Where, metres in the viewer's eye: x to the right, z along the view, y to the side to which
+    /// the light leans forwards. Errors are largest on the other side.
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     pub(crate) point: DVec3,
     /// A surface there, by its slopes dx/dz and dy/dz: tells what errors are multiplied with on it.
@@ -103,8 +103,8 @@ pub(crate) struct Storage {
         value_parser = clap::value_parser!(u32).range(1..=Partition::MAX_SLICES as i64)
     )]
     pub(crate) slices: u32,
-    /// Maps for the four sides of the view, sliced each, and one for its near face. Has closed forms for light
-    /// overhead and behind.
+    /// Maps for the four sides of the view, sliced each, and one for its near face. Has closed
+    /// forms for light overhead and behind.
     #[arg(long)]
     pub(crate) face: bool,
     /// overhead, behind, or the angle between view and light, 0 to 180 degrees.
@@ -216,7 +216,8 @@ lispsm is as published, (n + √(n f))/sin θ. lispsm(range) takes no more of
 the view for f than the tilted warp's range, as its authors advise; so does
 the planner's lispsm.";
 
-/// LiSPSM with its authors' advice for tilted views, which the language of --shadows has no word for.
+/// LiSPSM with its authors' advice for tilted views, which the language of --shadows has no word
+/// for.
 const IN_RANGE: &str = "lispsm(range)";
 
 impl Theory {

@@ -182,7 +182,8 @@ fn an_empty_folder_is_taken() {
     assert!(desk.path("report/index.html").is_file());
 }
 
-/// Specifications that say how many texels they have keep them; the others take what the error needs.
+/// Specifications that say how many texels they have keep them; the others take what the error
+/// needs.
 #[test]
 fn a_largest_error_decides_the_texels() {
     let desk = Desk::new();

@@ -161,8 +161,8 @@ fn errors_at_any_angle_are_measured() {
     assert_measured(&desk, "figures/ours-critical.csv", 1e-6);
     assert_measured(&desk, "figures/ours-gain.csv", 1e-6);
     let rows = table(&desk, "figures/ours-theta.csv");
-    // Found by sampling λ, no finer than to a hundredth: M_q·M_p and the largest E_q·E_p of an even map, LiSPSM and
-    // the best storage, and the best largest E_q·E_p with its M_q·M_p.
+    // Found by sampling λ, no finer than to a hundredth: M_q·M_p and the largest E_q·E_p of an even
+    // map, LiSPSM and the best storage, and the best largest E_q·E_p with its M_q·M_p.
     for (theta, expected) in [
         ("90", [34_300.0, 34_300.0, 343.0, 343.0, 343.0, 343.0, 343.0, 74.4]),
         ("75", [38_400.0, 38_400.0, 522.0, 477.0, 520.0, 520.0, 548.0, 118.0]),
@@ -237,7 +237,8 @@ fn shadow_test_of_waves_is_the_papers() {
         }
         assert!((at("offset", order, 0.0) - 1.0).abs() < 1e-6);
     }
-    // 8 bits are seen, and do no harm: at most half a step of 1/127 in sine and cosine of each term.
+    // 8 bits are seen, and do no harm: at most half a step of 1/127 in sine and cosine of each
+    // term.
     for file in ["csm-fig3", "csm-fig6"] {
         let rows = table(&desk, &format!("figures/{file}.csv"));
         let off = rows.iter().map(|r| (number(r, "light") - number(r, "light_measured")).abs());
@@ -253,7 +254,8 @@ fn side_views_and_their_pictures_are_complete() {
     assert_measured(&desk, "figures/theory-fig3.csv", 1e-6);
     for degrees in ["90", "60", "30"] {
         let svg = std::fs::read_to_string(desk.path(&format!("figures/theory-fig3-{degrees}.svg")));
-        // Three side views, a map and a picture for each of four techniques, all in the file itself.
+        // Three side views, a map and a picture for each of four techniques, all in the file
+        // itself.
         assert_eq!(svg.unwrap().matches("href=\"data:image/png;base64,").count(), 20);
     }
 }

@@ -1,7 +1,7 @@
 //! Small pictures that must not change unnoticed.
 //!
-//! A picture without a golden fails. `UMBRAGE_BLESS=1` makes what is rendered the golden: look at it
-//! before you commit it. A failure leaves `expected.png`, `actual.png`, `difference.png` and
+//! A picture without a golden fails. `UMBRAGE_BLESS=1` makes what is rendered the golden: look at
+//! it before you commit it. A failure leaves `expected.png`, `actual.png`, `difference.png` and
 //! `figures.json` in `target/tmp/goldens/<name>`.
 
 use crate::desk::Desk;

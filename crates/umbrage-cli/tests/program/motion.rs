@@ -39,7 +39,8 @@ fn stable_maps_hardly_flicker_while_the_viewer_moves() {
     }
 }
 
-/// Under a light that turns, maps of every kind turn: then even what stands still in the world flickers.
+/// Under a light that turns, maps of every kind turn: then even what stands still in the world
+/// flickers.
 #[test]
 fn a_sun_that_moves_makes_stable_slices_flicker() {
     let desk = Desk::new();
@@ -112,8 +113,8 @@ fn motions_that_cannot_be() {
     assert_eq!(desk.json(&torch)["results"][0]["flicker"], 0.0);
 }
 
-/// A forest far away, where many texels fall into a pixel (Annen et al. 2007, Fig. 10): numbers filtered as wide as the pixel sparkle a third of what bilinear
-/// comparisons do at most.
+/// A forest far away, where many texels fall into a pixel (Annen et al. 2007, Fig. 10): numbers
+/// filtered as wide as the pixel sparkle a third of what bilinear comparisons do at most.
 #[needs(scenes)]
 #[test]
 fn filtered_numbers_do_not_sparkle_where_comparisons_do() {

@@ -1,4 +1,5 @@
-//! Plans of several maps: slices, faces, sides of a cube, lights; sizes by error; one texture for all.
+//! Plans of several maps: slices, faces, sides of a cube, lights; sizes by error; one texture for
+//! all.
 
 use crate::desk::{Desk, STAGE_GLTF, keys};
 use glam::{DMat4, DVec3, Vec4Swizzles};
@@ -7,7 +8,8 @@ use serde_json::{Value, json};
 const NEAR: f64 = 0.1;
 const FAR: f64 = 500.0;
 
-/// A plan of a view from 2 m above the world's origin along −z, 60° high and 16:9 wide, with no scene.
+/// A plan of a view from 2 m above the world's origin along −z, 60° high and 16:9 wide, with no
+/// scene.
 fn plan(shadows: &str, options: &str) -> Value {
     let view =
         "plan --eye 0,2,0 --target 0,2,-1 --fov 60 --near 0.1 --far 500 --size 1280x720 --json";

@@ -39,8 +39,8 @@ fn every_aov_is_written_as_png_and_exr() {
 
 #[test]
 fn visibility_is_white_in_light_and_black_in_shadow() {
-    // Straight from above onto a triangle in the sun: all of it is lit. With the light from below all
-    // of it faces away.
+    // Straight from above onto a triangle in the sun: all of it is lit. With the light from below
+    // all of it faces away.
     let desk = Desk::new();
     desk.write("stage.gltf", STAGE_GLTF);
     let common = [

@@ -137,7 +137,8 @@ fn a_finished_sweep_prints_its_means_again() {
     assert_eq!(desk.succeed(&small("out", &[])), first);
 }
 
-/// The views that are there, each whole, by the text of their reports, whose times tell one run from another.
+/// The views that are there, each whole, by the text of their reports, whose times tell one run
+/// from another.
 fn whole_views(output: &Path) -> BTreeMap<String, String> {
     let views = output.join("views");
     let names = if views.is_dir() { listing(&views) } else { Vec::new() };
@@ -174,7 +175,8 @@ fn killed_at_any_moment_it_goes_on_where_it_was() {
     let is_unfinished = |folder: &Path| {
         folder.is_dir() && listing(folder).iter().any(|n| n.starts_with(".umbrage-"))
     };
-    // Killed in turns: as soon as there is a folder, while something is unfinished, when a view is done.
+    // Killed in turns: as soon as there is a folder, while something is unfinished, when a view is
+    // done.
     for moment in (0..3).cycle().take(9) {
         let mut command = desk.command(&sweep("out"));
         let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
@@ -299,7 +301,8 @@ fn shares_join_to_the_very_same_tables() {
     }
     assert_eq!(listing(&desk.path("joined/views/a")), listing(&desk.path("whole/views/a")));
 
-    // Shares may also be done in one folder, one after the other; the whole then has nothing left to do.
+    // Shares may also be done in one folder, one after the other; the whole then has nothing left
+    // to do.
     for share in ["1/2", "2/2"] {
         desk.run(&small("turns", &["--shard", share]));
     }

@@ -6,14 +6,14 @@ use crate::progress::Progress;
 use crate::technique::NamedTechnique;
 use umbrage_trace::{Sample, View};
 
-/// How much every technique's shadows change, from frame to frame, where the truth does not: the mean
-/// change of visibility, which for hard shadows is the share of points that change. `progress` hears of
-/// as many rows a frame as its picture has.
+/// How much every technique's shadows change, from frame to frame, where the truth does not: the
+/// mean change of visibility, which for hard shadows is the share of points that change. `progress`
+/// hears of as many rows a frame as its picture has.
 ///
-/// What a pixel shows is followed back into the frame before, where it must have been seen as well, and
-/// the truth and the technique are asked there again. So only shadows count that change on a point of a
-/// surface, and not what appears, vanishes or moves across the picture. Compared are points that face
-/// the light in both frames; `None` if there are none.
+/// What a pixel shows is followed back into the frame before, where it must have been seen as well,
+/// and the truth and the technique are asked there again. So only shadows count that change on a
+/// point of a surface, and not what appears, vanishes or moves across the picture. Compared are
+/// points that face the light in both frames; `None` if there are none.
 ///
 /// # Errors
 /// Frames that do not exist, and what the planner or a GPU refuses.
@@ -54,8 +54,8 @@ pub fn flicker(
     Ok(change.iter().map(|sum| (compared > 0).then(|| sum / compared as f64)).collect())
 }
 
-/// A sample as it is and as it was in the frame before, if it counts in both and the truth about it has
-/// not changed.
+/// A sample as it is and as it was in the frame before, if it counts in both and the truth about it
+/// has not changed.
 fn steady(sample: &Sample, view: &View<'_>, last: &View<'_>) -> Option<[Sample; 2]> {
     let was = last.sees(&sample.surface)?;
     let both_count =

@@ -17,8 +17,8 @@ pub enum Motion {
     Orbit,
     /// The light turns about the vertical, a tenth of a degree a frame.
     Sun,
-    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that more
-    /// and more texels fall into a pixel.
+    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that
+    /// more and more texels fall into a pixel.
     Away,
 }
 

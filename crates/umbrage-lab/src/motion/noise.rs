@@ -22,10 +22,10 @@ pub struct Noise {
     pub mean: Option<f64>,
 }
 
-/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at its
-/// centre being compared with the mean of 64 true ones all over it. What is wrong but steady, as a blur
-/// is, does not count. A pixel counts where surfaces that face the light fill it in both frames.
-/// `progress` hears of as many rows a frame as its picture has.
+/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at
+/// its centre being compared with the mean of 64 true ones all over it. What is wrong but steady,
+/// as a blur is, does not count. A pixel counts where surfaces that face the light fill it in both
+/// frames. `progress` hears of as many rows a frame as its picture has.
 ///
 /// # Errors
 /// Frames that do not exist, and what the planner or a GPU refuses.

@@ -7,8 +7,8 @@
 //! results.csv, results.json, index.html
 //! ```
 //!
-//! A view's folder comes into being by a rename, whole. What was being made when a process died is left
-//! under a name that begins with `.umbrage-`; the next process clears it away.
+//! A view's folder comes into being by a rename, whole. What was being made when a process died is
+//! left under a name that begins with `.umbrage-`; the next process clears it away.
 
 use super::views::SweepView;
 use crate::error::{About, Difference, Error, Field};
@@ -147,7 +147,8 @@ fn clear(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Puts a view's result in place, whole: `write` fills a folder with its report, unless there is an `error`.
+/// Puts a view's result in place, whole: `write` fills a folder with its report, unless there is an
+/// `error`.
 pub(super) fn put(
     place: &ReportFolder,
     inputs: &Inputs,

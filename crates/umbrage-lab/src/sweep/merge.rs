@@ -14,8 +14,8 @@ pub(super) struct Found {
     pub(super) stored: Stored,
 }
 
-/// Finds each view's result in `output`, as far as it is there, and in the `shares`. A report goes before
-/// a failure.
+/// Finds each view's result in `output`, as far as it is there, and in the `shares`. A report goes
+/// before a failure.
 ///
 /// # Errors
 /// Shares of another sweep; views that no share has or for which shares differ, all of them listed.

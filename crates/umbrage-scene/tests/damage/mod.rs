@@ -1,4 +1,5 @@
-//! Files cut short and with bytes changed, the same way each time, and what must hold of what loads.
+//! Files cut short and with bytes changed, the same way each time, and what must hold of what
+//! loads.
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use umbrage_scene::{Scene, load};

@@ -14,8 +14,8 @@
 //! | [`Csm`] | sines and cosines of depth | the Fourier series of the step function |
 //!
 //! A new statistic needs a file beside this one, a file of the same name in
-//! `umbrage-wgpu/src/wgsl/statistic`, and a line in each `match` over the variants of [`Statistic`], which
-//! the compiler reports.
+//! `umbrage-wgpu/src/wgsl/statistic`, and a line in each `match` over the variants of
+//! [`Statistic`], which the compiler reports.
 
 mod csm;
 mod esm;

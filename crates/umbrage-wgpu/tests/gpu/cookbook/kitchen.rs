@@ -90,8 +90,8 @@ fn on_sphere(p: DVec3, towards: DVec3) -> Option<f64> {
     (root > 0.0).then(|| -b - root.sqrt()).filter(|&t| t > 1e-9)
 }
 
-/// The share of the dome's pixels in full light (away from its rim and its terminator, unshadowed) that
-/// a picture has darker than three quarters.
+/// The share of the dome's pixels in full light (away from its rim and its terminator, unshadowed)
+/// that a picture has darker than three quarters.
 pub(crate) fn dark_on_dome(picture: &[[u8; 4]], camera: &Camera, to_sun: DVec3) -> f64 {
     let (mut dark, mut all) = (0, 0);
     for y in 0..SIZE[1] {
