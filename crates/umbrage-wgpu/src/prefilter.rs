@@ -47,15 +47,15 @@ pub(crate) struct Prefiltering {
     stride: u32,
     uniforms: Buffer,
     bytes: Vec<u8>,
-    numbers: Numbers,
+    statistics: Statistics,
     /// The statistics blurred along rows only.
-    scratch: Option<Numbers>,
+    scratch: Option<Statistics>,
     bindings: Bindings,
 }
 
 /// Textures of statistics. The layers for one layer of maps follow one another.
 #[derive(Debug)]
-struct Numbers {
+struct Statistics {
     all: TextureView,
     /// For each mip level, the view that passes read, and for each layer the view that they draw
     /// into.
@@ -70,7 +70,7 @@ struct Bindings {
     /// The depths; one bind group for each layer of maps.
     depths: Vec<BindGroup>,
     /// The statistics; one bind group for each mip level.
-    numbers: Vec<BindGroup>,
+    statistics: Vec<BindGroup>,
     scratch: Option<BindGroup>,
 }
 
@@ -89,7 +89,7 @@ fn format(statistic: &Statistic) -> TextureFormat {
 /// Checks that the device can store and interpolate a statistic.
 fn check(statistic: &Statistic, support: &Support) -> Result<(), Error> {
     let lacks = |what| {
-        let why = "in which this filter stores its numbers: take another filter, such as pcf";
+        let why = "in which this filter stores its statistics: take another filter, such as pcf";
         Err(Error::Unsupported { what, why })
     };
     match statistic.storage() {
@@ -143,16 +143,16 @@ impl Prefiltering {
         let stride = (size_of::<PrefilterMap>() as u32).next_multiple_of(support.uniform_alignment);
         let uniforms = uniforms(device, stride);
         let size = stored_size(depths, first_level);
-        let numbers =
-            |levels| Numbers::new(device, support, format, depths, size, textures, levels);
-        let scratch = is_blurred.then(|| numbers(1));
-        let numbers = numbers(levels);
+        let statistics =
+            |levels| Statistics::new(device, support, format, depths, size, textures, levels);
+        let scratch = is_blurred.then(|| statistics(1));
+        let statistics = statistics(levels);
         let bindings = Bindings::new(
             device,
             [&encode_layout, &blur_layout],
             &uniforms,
             depths,
-            &numbers,
+            &statistics,
             scratch.as_ref(),
         );
         Ok(Self {
@@ -171,7 +171,7 @@ impl Prefiltering {
             stride,
             uniforms,
             bytes: Vec::new(),
-            numbers,
+            statistics,
             scratch,
             bindings,
         })
@@ -179,22 +179,22 @@ impl Prefiltering {
 
     /// The prefiltered maps, which lookup samples.
     pub(crate) fn view(&self) -> &TextureView {
-        &self.numbers.all
+        &self.statistics.all
     }
 
     /// Memory of the prefiltered maps, bytes, without the scratch texture that only the blur needs.
     pub(crate) fn bytes(&self) -> u64 {
-        self.numbers.bytes
+        self.statistics.bytes
     }
 
     /// Creates textures for the maps of a new depth texture.
     pub(crate) fn resize(&mut self, device: &Device, support: &Support, depths: &DepthTexture) {
         let size = stored_size(depths, self.first_level);
-        let numbers = |levels| {
-            Numbers::new(device, support, self.format, depths, size, self.textures, levels)
+        let statistics = |levels| {
+            Statistics::new(device, support, self.format, depths, size, self.textures, levels)
         };
-        self.scratch = (self.radius > 0).then(|| numbers(1));
-        self.numbers = numbers(self.levels);
+        self.scratch = (self.radius > 0).then(|| statistics(1));
+        self.statistics = statistics(self.levels);
         self.rebind(device, depths);
     }
 
@@ -205,7 +205,7 @@ impl Prefiltering {
             layouts,
             &self.uniforms,
             depths,
-            &self.numbers,
+            &self.statistics,
             self.scratch.as_ref(),
         );
     }
@@ -247,21 +247,21 @@ impl Prefiltering {
         filter: &Filter,
         timestamps: Option<&RenderPassTimestampWrites<'_>>,
     ) {
-        let numbers = &self.numbers.layers;
-        let Bindings { depths, numbers: sources, scratch: blurred } = &self.bindings;
+        let statistics = &self.statistics.layers;
+        let Bindings { depths, statistics: sources, scratch: blurred } = &self.bindings;
         // Each step has pipelines, the bind group that they read, the views that they draw into,
         // the mip level, and the inset: the texels at each side that are left out because the blur
         // would read beyond the drawn texels there. Lookups do not reach the texels that are left
         // out.
         let radius = self.radius;
-        let mut steps = vec![(&self.encode, &depths[layer], &numbers[0], 0, [0; 2])];
+        let mut steps = vec![(&self.encode, &depths[layer], &statistics[0], 0, [0; 2])];
         if let (Some(scratch), Some(blurred)) = (&self.scratch, blurred) {
             steps.push((&self.rows, &sources[0], &scratch.layers[0], 0, [radius, 0]));
-            steps.push((&self.columns, blurred, &numbers[0], 0, [radius; 2]));
+            steps.push((&self.columns, blurred, &statistics[0], 0, [radius; 2]));
         }
         for level in 1..self.levels {
             let from = &sources[level as usize - 1];
-            steps.push((&self.halve, from, &numbers[level as usize], level, [0; 2]));
+            steps.push((&self.halve, from, &statistics[level as usize], level, [0; 2]));
         }
         let passes = steps.len() * self.groups.len();
         let mut index = 0;
@@ -306,7 +306,7 @@ fn attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
     })
 }
 
-impl Numbers {
+impl Statistics {
     fn new(
         device: &Device,
         support: &Support,
@@ -321,7 +321,7 @@ impl Numbers {
         let levels = levels.min(width.max(height).max(1).ilog2() + 1);
         let layers = support.array_layers(textures * depths.layers.len() as u32);
         let texture = device.create_texture(&TextureDescriptor {
-            label: Some("shadow numbers"),
+            label: Some("shadow statistics"),
             size: Extent3d { width, height, depth_or_array_layers: layers },
             mip_level_count: levels,
             sample_count: 1,
@@ -361,8 +361,8 @@ impl Bindings {
         [encode, blur]: [&BindGroupLayout; 2],
         uniforms: &Buffer,
         depths: &DepthTexture,
-        numbers: &Numbers,
-        scratch: Option<&Numbers>,
+        statistics: &Statistics,
+        scratch: Option<&Statistics>,
     ) -> Self {
         let bind = |layout, view| {
             device.create_bind_group(&BindGroupDescriptor {
@@ -383,7 +383,7 @@ impl Bindings {
         };
         Self {
             depths: depths.layers.iter().map(|view| bind(encode, view)).collect(),
-            numbers: numbers.sources.iter().map(|view| bind(blur, view)).collect(),
+            statistics: statistics.sources.iter().map(|view| bind(blur, view)).collect(),
             scratch: scratch.map(|s| bind(blur, &s.all)),
         }
     }

@@ -161,8 +161,8 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
         (Filter::Prefiltered(prefilter), _) => {
             shader.add([
                 match layout {
-                    Layout::Atlas => module!("texture/atlas_numbers"),
-                    Layout::Layers => module!("texture/layers_numbers"),
+                    Layout::Atlas => module!("texture/atlas_statistics"),
+                    Layout::Layers => module!("texture/layers_statistics"),
                 },
                 module!("filter/prefiltered"),
             ]);
@@ -335,7 +335,7 @@ fn prefilter_shader(prefilter: &Prefilter, pass: PrefilterPass, range: Range<u32
             shader.add([
                 module!("prefilter"),
                 if prefilter.half { module!("encoded/half") } else { module!("encoded/full") },
-                module!("texel_numbers"),
+                module!("texel_statistics"),
                 module!("slab"),
                 generated::encoded_outputs(range),
             ]);

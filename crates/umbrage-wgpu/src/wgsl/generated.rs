@@ -21,16 +21,16 @@ pub(super) enum Axis {
 pub(super) fn samples(textures: u32) -> Module {
     let mut text = "\
 import package::constants::SHADOW_TEXTURES;
-import package::texture::atlas_numbers::{shadow_numbers, shadow_sampler};
+import package::texture::atlas_statistics::{shadow_statistics, shadow_sampler};
 
-// Written by `generated.rs`: one sample of all of a map's numbers, which begin in layer `first`.
+// Written by `generated.rs`: one sample of all statistics of a map, which begin in layer `first`.
 fn shadow_sample(at: vec2f, first: u32, lod: f32) -> array<vec4f, SHADOW_TEXTURES> {
     return array<vec4f, SHADOW_TEXTURES>(
 "
     .to_owned();
     for t in 0..textures {
         text += &format!(
-            "        textureSampleLevel(shadow_numbers, shadow_sampler, at, first + {t}u, lod),\n"
+            "        textureSampleLevel(shadow_statistics, shadow_sampler, at, first + {t}u, lod),\n"
         );
     }
     Module { path: "samples", text: (text + "    );\n}\n").into() }
@@ -64,11 +64,11 @@ fn shadow_blurred(at: vec2i, layer: u32) -> vec4f {{
 /// `shadow_outputs` of the pass that encodes: the given `textures` of those that a texel's
 /// statistics take.
 pub(super) fn encoded_outputs(textures: Range<u32>) -> Module {
-    let values = textures.clone().map(|t| format!("numbers[{t}]"));
+    let values = textures.clone().map(|t| format!("statistics[{t}]"));
     let text = outputs(
         "import package::constants::SHADOW_TEXTURES;",
         textures.len(),
-        "numbers: array<vec4f, SHADOW_TEXTURES>",
+        "statistics: array<vec4f, SHADOW_TEXTURES>",
         values,
     );
     Module { path: "encoded_outputs", text: text.into() }
@@ -100,7 +100,7 @@ fn outputs(
         "\
 {import}
 
-// Written by `generated.rs`: of a map's textures, those that a pass draws into.
+// Written by `generated.rs`: the textures of a map that a pass draws into.
 struct ShadowPrefiltered {{
 {members}}}
 

@@ -255,7 +255,7 @@ fn comparisons_over_a_width_are_those_of_rust() {
 /// precision, or for 8 bits that of their resolution.
 #[needs(gpu)]
 #[test]
-fn numbers_over_a_width_are_those_of_rust() {
+fn statistics_over_a_width_are_those_of_rust() {
     let technique = technique("lispsm+z2@256");
     let csm = Statistic::Csm(Csm::new(8, 0.0, false, true).unwrap());
     for (statistic, tolerance) in [(Statistic::Vsm(Vsm::default()), 1e-3), (csm, 1e-2)] {
