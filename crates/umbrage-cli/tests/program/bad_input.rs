@@ -77,7 +77,7 @@ fn shared_options() {
         (&["--shadows", "uniform:pcf99"], "from 1 to 15"),
         (&["--shadows", "lambda=-2"], "positive"),
         (&["--shadows", "lispsm+z17"], "from 1 to 16"),
-        (&["--shadows", "lispsm+z4(fited)"], "did you mean `fitted`?"),
+        (&["--shadows", "lispsm+z4(fited)"], "did you mean `+z4(fitted)`?"),
         (&["--shadows", "lispsm+z4(at=5/20)"], "3 ascending numbers of metres"),
         (&["--shadows", "lispsm+face(top)"], "did you mean `+face(sides)`?"),
         (&["--shadows", "uniform(stable)+face"], "`+face`: stable maps do not turn with the view"),
