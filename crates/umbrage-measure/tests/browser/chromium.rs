@@ -66,16 +66,30 @@ impl Browser {
 
     /// The value of a JavaScript expression; promises are awaited.
     pub(crate) fn eval(&mut self, expression: &str) -> Value {
-        let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
-        let answer = self.call("Runtime.evaluate", params);
-        assert!(answer.get("exceptionDetails").is_none(), "{expression}: {answer:#}");
-        answer["result"]["value"].clone()
+        self.try_eval(expression).unwrap_or_else(|error| panic!("{expression}: {error:#}"))
     }
 
-    /// Waits until a JavaScript expression is true.
+    /// The value of a JavaScript expression, or DevTools' error, which is not one that the
+    /// expression throws.
+    fn try_eval(&mut self, expression: &str) -> Result<Value, Value> {
+        let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
+        let answer = self.try_call("Runtime.evaluate", params)?;
+        assert!(answer.get("exceptionDetails").is_none(), "{expression}: {answer:#}");
+        Ok(answer["result"]["value"].clone())
+    }
+
+    /// Waits until a JavaScript expression is true. The page may be replaced by another meanwhile.
     pub(crate) fn wait_for(&mut self, expression: &str) {
+        const REPLACED: &str = "Inspected target navigated or closed";
         let start = Instant::now();
-        while self.eval(expression) != json!(true) {
+        loop {
+            match self.try_eval(expression) {
+                Ok(Value::Bool(true)) => return,
+                Err(error) if error["message"] != json!(REPLACED) => {
+                    panic!("{expression}: {error:#}")
+                }
+                Ok(_) | Err(_) => {}
+            }
             assert!(start.elapsed() < PATIENCE, "still not true: {expression}");
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -150,10 +164,7 @@ impl Browser {
 
     /// The content of the window.
     pub(crate) fn screenshot(&mut self) -> image::RgbImage {
-        // After two frames, everything requested before has been painted.
-        self.eval(
-            "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(() => r(1))))",
-        );
+        self.wait_for_paint();
         let shot = self.call("Page.captureScreenshot", json!({"format": "png"}));
         let png = BASE64_STANDARD.decode(shot["data"].as_str().unwrap()).unwrap();
         image::load_from_memory(&png).unwrap().to_rgb8()
@@ -168,6 +179,11 @@ impl Browser {
 
     /// Sends a command and waits for its answer. Events that arrive meanwhile are recorded.
     pub(crate) fn call(&mut self, method: &str, params: Value) -> Value {
+        self.try_call(method, params).unwrap_or_else(|error| panic!("{method}: {error:#}"))
+    }
+
+    /// The same; an error is DevTools' own.
+    fn try_call(&mut self, method: &str, params: Value) -> Result<Value, Value> {
         self.next_id += 1;
         let id = self.next_id;
         let mut message = json!({"id": id, "method": method});
@@ -183,8 +199,10 @@ impl Browser {
                 Err(e) => panic!("Chromium did not answer {method}: {e}"),
             };
             if answer["id"] == json!(id) {
-                assert!(answer.get("error").is_none(), "{method}: {answer:#}");
-                return answer["result"].clone();
+                return match answer.get("error") {
+                    Some(error) => Err(error.clone()),
+                    None => Ok(answer["result"].clone()),
+                };
             }
             self.take_in(&answer);
         }
