@@ -128,8 +128,7 @@ pub fn builtins() -> &'static [BuiltinInfo] {
 /// The name is unknown (the error gives the most similar valid one), or the size is out of range.
 pub fn builtin(name: &str, size: Option<u32>) -> Result<Scene, SceneError> {
     let Some(info) = BUILTINS.iter().find(|b| b.name == name) else {
-        let distance = |b: &&BuiltinInfo| strsim::damerau_levenshtein(b.name, name);
-        let nearest = BUILTINS.iter().min_by_key(distance).map_or("", |b| b.name);
+        let nearest = umbrage::language::nearest(name, BUILTINS.iter().map(|b| b.name));
         return Err(SceneError::UnknownBuiltin { name: name.into(), nearest });
     };
     let size = size.unwrap_or(info.default_size);
