@@ -56,6 +56,9 @@ impl Default for Technique {
     }
 }
 
+/// The longest side that a map can have on any device, in texels.
+const MAX_SIDE: u32 = 65536;
+
 /// The texture sizes that the device allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -297,8 +300,8 @@ impl Limits {
     /// Checks that the limits are in their ranges and that they allow the technique's size.
     pub(crate) fn check(&self, technique: &Technique) -> Result<(), Error> {
         let Self { max_side, align } = *self;
-        check((1..=65536).contains(&max_side), "limits.max_side", || {
-            format!("must be 1 to 65536 texels, is {max_side}")
+        check((1..=MAX_SIDE).contains(&max_side), "limits.max_side", || {
+            format!("must be 1 to {MAX_SIDE} texels, is {max_side}")
         })?;
         check((1..=max_side).contains(&align), "limits.align", || {
             format!("must be 1 to max_side ({max_side}) texels, is {align}")

@@ -1,9 +1,11 @@
 //! Techniques as Rust code, for reports whose readers copy it.
 
-use super::{Cover, Faces, Objective, Partition, Size, Splits, Technique, Warp};
+use super::{Faces, Partition, Size, Splits, Technique, Warp};
 use crate::visibility::statistic::{Statistic, Storage};
-use crate::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
+use crate::visibility::{Blur, Filter, Prefilter};
 
+// The derived `Debug` of a variant whose fields are numbers is its Rust code, without the type's
+// name.
 impl Technique {
     /// Rust code that constructs this technique: the necessary `use` lines and
     /// `let technique = …;`. Fields with default values are left out.
@@ -12,7 +14,7 @@ impl Technique {
         let Self { warp, cover, partition, filter, size } = *self;
         let fields = [
             (warp != default.warp).then(|| format!("warp: {}", warp_code(warp))),
-            (cover != default.cover).then(|| format!("cover: {}", cover_code(cover))),
+            (cover != default.cover).then(|| format!("cover: Cover::{cover:?}")),
             (partition != default.partition)
                 .then(|| format!("partition: {}", partition_code(&partition))),
             (filter != default.filter).then(|| format!("filter: {}", filter_code(&filter))),
@@ -56,33 +58,21 @@ impl Technique {
 
 fn warp_code(warp: Warp) -> String {
     match warp {
-        Warp::Uniform | Warp::Psm | Warp::Lispsm | Warp::Log => format!("Warp::{warp:?}"),
-        Warp::Tsm { focus } => format!("Warp::Tsm {{ focus: {focus:?} }}"),
-        Warp::Adaptive(Objective::Storage) => "Warp::Adaptive(Objective::Storage)".to_owned(),
-        Warp::Adaptive(Objective::Area) => "Warp::Adaptive(Objective::Area)".to_owned(),
+        Warp::Adaptive(objective) => format!("Warp::Adaptive(Objective::{objective:?})"),
         Warp::Lambda(lambda) if lambda.is_infinite() => "Warp::Lambda(f64::INFINITY)".to_owned(),
-        Warp::Lambda(lambda) => format!("Warp::Lambda({lambda:?})"),
-    }
-}
-
-fn cover_code(cover: Cover) -> &'static str {
-    match cover {
-        Cover::Seen => "Cover::Seen",
-        Cover::Scene => "Cover::Scene",
-        Cover::Stable => "Cover::Stable",
+        Warp::Uniform
+        | Warp::Psm
+        | Warp::Lispsm
+        | Warp::Tsm { .. }
+        | Warp::Log
+        | Warp::Lambda(_) => format!("Warp::{warp:?}"),
     }
 }
 
 fn partition_code(partition: &Partition) -> String {
     let Partition { slices, splits, overlap, faces } = *partition;
-    let splits = match splits {
-        Splits::SelfSimilar => None,
-        Splits::Practical(blend) => Some(format!("Splits::Practical({blend:?})")),
-        Splits::At(distances) => Some(format!("Splits::At({distances:?})")),
-        Splits::Fitted => Some("Splits::Fitted".to_owned()),
-    };
     let told = [
-        splits.map(|splits| format!("splits: {splits}")),
+        (splits != Splits::SelfSimilar).then(|| format!("splits: Splits::{splits:?}")),
         (overlap != 0.0).then(|| format!("overlap: {overlap:?}")),
         (faces != Faces::Whole).then(|| format!("faces: Faces::{faces:?}")),
     ];
@@ -97,34 +87,23 @@ fn size_code(size: Size) -> String {
             side if side * side == texels => format!("Size::Budget({side} * {side})"),
             _ => format!("Size::Budget({texels})"),
         },
-        Size::Exact(size) => format!("Size::Exact({size:?})"),
-        Size::MaxError(pixels) => format!("Size::MaxError({pixels:?})"),
+        Size::Exact(_) | Size::MaxError(_) => format!("Size::{size:?}"),
     }
 }
 
 fn filter_code(filter: &Filter) -> String {
     match filter {
-        Filter::Hard => "Filter::Hard".to_owned(),
-        Filter::Pcf { n } => format!("Filter::Pcf {{ n: {n} }}"),
-        Filter::Spread { n, width, pattern } => {
-            let pattern = match pattern {
-                Pattern::Grid => "Pattern::Grid",
-                Pattern::Poisson => "Pattern::Poisson",
-            };
-            let width = width_code(*width);
-            format!("Filter::Spread {{ n: {n}, width: {width}, pattern: {pattern} }}")
-        }
+        Filter::Hard | Filter::Pcf { .. } => format!("Filter::{filter:?}"),
+        Filter::Spread { n, width, pattern } => format!(
+            "Filter::Spread {{ n: {n}, width: Width::{width:?}, pattern: Pattern::{pattern:?} }}"
+        ),
         Filter::Pcss { n, light } => {
-            let light = match light {
-                LightSize::Degrees(size) => format!("LightSize::Degrees({size:?})"),
-                LightSize::Metres(size) => format!("LightSize::Metres({size:?})"),
-            };
-            format!("Filter::Pcss {{ n: {n}, light: {light} }}")
+            format!("Filter::Pcss {{ n: {n}, light: LightSize::{light:?} }}")
         }
         Filter::Prefiltered(Prefilter { statistic, blur, half }) => {
             let blur = match blur {
-                Blur::Texels(n) => format!("Blur::Texels({n})"),
-                Blur::Width(width) => format!("Blur::Width({})", width_code(*width)),
+                Blur::Texels(_) => format!("Blur::{blur:?}"),
+                Blur::Width(width) => format!("Blur::Width(Width::{width:?})"),
             };
             let statistic = statistic_code(statistic);
             format!(
@@ -134,19 +113,11 @@ fn filter_code(filter: &Filter) -> String {
     }
 }
 
-fn width_code(width: Width) -> String {
-    match width {
-        Width::Pixels(width) => format!("Width::Pixels({width:?})"),
-        Width::Metres(width) => format!("Width::Metres({width:?})"),
-    }
-}
-
 fn statistic_code(statistic: &Statistic) -> String {
     match statistic {
-        Statistic::Vsm(s) => format!("Statistic::Vsm({s:?})"),
-        Statistic::Esm(s) => format!("Statistic::Esm({s:?})"),
-        Statistic::Evsm(s) => format!("Statistic::Evsm({s:?})"),
-        Statistic::Msm(s) => format!("Statistic::Msm({s:?})"),
+        Statistic::Vsm(_) | Statistic::Esm(_) | Statistic::Evsm(_) | Statistic::Msm(_) => {
+            format!("Statistic::{statistic:?}")
+        }
         Statistic::Csm(s) => {
             let [offset, scale] = s.brightening();
             let bits = if statistic.storage() == Storage::Snorm16 { ".in_16_bits()" } else { "" };

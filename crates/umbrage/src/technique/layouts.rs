@@ -3,7 +3,7 @@
 use super::language::{
     FILTERS, Kind, ParseError, Short, Word, WordOption, Written, count, split_once, write_word,
 };
-use super::{Cover, Faces, Objective, Partition, Size, Splits, Warp};
+use super::{Cover, Faces, MAX_SIDE, Objective, Partition, Size, Splits, Warp};
 use std::fmt::{self, Write};
 use std::str::FromStr;
 
@@ -373,9 +373,6 @@ pub(super) fn write_faces(f: &mut impl Write, faces: Faces) -> fmt::Result {
         Faces::Sides => "+face(sides)",
     })
 }
-
-/// The longest side in the text of a size, texels.
-const MAX_SIDE: u32 = 1 << 16;
 
 /// The kind of size that a text has the form of.
 pub(super) fn size_word(text: &str) -> &'static Word {
