@@ -5,7 +5,6 @@ use crate::executor::{Executor, OnGpu, RenderScene, Work};
 use crate::planning::milliseconds;
 use crate::strip::Rows;
 use std::time::Instant;
-use umbrage::visibility::Filter;
 use umbrage::{Plan, Technique};
 use umbrage_render::{Drawn, FrameTarget, Shading, Timer};
 use umbrage_trace::{Reference, Tracer, View};
@@ -107,7 +106,7 @@ fn frame_on_gpu(
         }
     };
     let [depth, filter] = if drawn.is_empty() { [0.0; 2] } else { [depth, filter] };
-    let is_prefiltered = matches!(renderer.shadows().options().filter, Filter::Prefiltered(_));
+    let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
     Ok(Costs { bytes, depth, filter, shade, drawn: Some(drawn) })

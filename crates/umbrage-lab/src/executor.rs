@@ -4,7 +4,6 @@ use crate::error::{About, Error};
 use crate::executors::{Executors, GPU, REFERENCE, runs_on_gpu};
 use crate::strip::{Rows, Strip};
 use rayon::prelude::*;
-use umbrage::visibility::Filter;
 use umbrage::{Plan, Technique};
 use umbrage_render::{Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_scene::Scene;
@@ -54,7 +53,7 @@ impl<'a> RenderScene<'a> {
             Some((gpu, buffers)) => {
                 let options = ShadowOptions { filter, ..ShadowOptions::default() };
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
-                let is_prefiltered = matches!(filter, Filter::Prefiltered(_));
+                let is_prefiltered = filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
                 Work::Gpu(Box::new(OnGpu { renderer, gpu, timer, plan: None }))
             }

@@ -1,22 +1,21 @@
-use crate::data::{CasterMap, Lookup, Placed, clip_from_render};
+mod resources;
+
+use crate::data::{Lookup, Placed, clip_from_render};
 use crate::passes::{Clear, Prepared};
 use crate::prefilter::Prefiltering;
 use crate::slots::Slots;
-use crate::wgsl::{self, MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
-use crate::{Error, Support, data};
+use crate::{Error, Support, wgsl};
 use glam::{DMat4, DVec3};
-use std::mem::size_of;
-use std::num::NonZeroU64;
-use umbrage::visibility::{Filter, Prefilter};
+pub(crate) use resources::DepthTexture;
+use resources::{Buffers, CasterBuffer, view_dimension};
+use umbrage::visibility::Filter;
 use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
-    BufferDescriptor, BufferUsages, CompareFunction, DepthStencilState, Device, Extent3d,
-    FilterMode, FragmentState, PipelineCompilationOptions, PrimitiveState, Queue,
-    SamplerBindingType, SamplerDescriptor, ShaderModule, ShaderStages, Texture, TextureDescriptor,
-    TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView,
-    TextureViewDescriptor, TextureViewDimension,
+    BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType,
+    BufferBindingType, CompareFunction, DepthStencilState, Device, Extent3d, FilterMode,
+    FragmentState, PipelineCompilationOptions, PrimitiveState, Queue, SamplerBindingType,
+    SamplerDescriptor, ShaderModule, ShaderStages, Texture, TextureFormat, TextureSampleType,
+    TextureView, TextureViewDimension,
 };
 
 /// Format of the texture that holds the depths of all maps.
@@ -122,37 +121,6 @@ pub struct Shadows {
     pub(crate) records: Vec<Record>,
 }
 
-/// The texture that holds the depths of all maps.
-#[derive(Debug)]
-pub(crate) struct DepthTexture {
-    texture: Texture,
-    all: TextureView,
-    /// One view for each layer.
-    pub(crate) layers: Vec<TextureView>,
-    /// Whether nothing has been drawn into the texture yet.
-    pub(crate) is_fresh: bool,
-}
-
-/// The buffers that lookup reads.
-#[derive(Debug)]
-struct Buffers {
-    settings: Buffer,
-    lights: Buffer,
-    maps: Buffer,
-    planes: Buffer,
-}
-
-/// The matrices with which casters are drawn into the maps, one every `stride` bytes, and the bind
-/// group that shows one of them.
-#[derive(Debug)]
-pub(crate) struct CasterBuffer {
-    pub(crate) layout: BindGroupLayout,
-    buffer: Buffer,
-    pub(crate) bind_group: BindGroup,
-    pub(crate) stride: u32,
-    bytes: Vec<u8>,
-}
-
 /// The state with which a map was drawn or is to be drawn. Comparing it with the plan shows whether
 /// the map must be drawn again.
 #[derive(Debug, Default)]
@@ -240,7 +208,7 @@ impl Shadows {
         let lookup_layout = lookup_layout(device, &support, &options);
         let buffers = Buffers::new(device, &support);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
-        let prefiltering = match prefilter(&options.filter) {
+        let prefiltering = match options.filter.prefilter() {
             Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
             None => None,
         };
@@ -579,194 +547,9 @@ impl Shadows {
     }
 }
 
-impl DepthTexture {
-    fn new(
-        device: &Device,
-        support: &Support,
-        layout: Layout,
-        size: [u32; 2],
-        layers: u32,
-    ) -> Self {
-        let layers = if layout == Layout::Layers { support.array_layers(layers) } else { 1 };
-        let texture = device.create_texture(&TextureDescriptor {
-            label: Some("shadow depths"),
-            size: Extent3d {
-                width: size[0].max(1),
-                height: size[1].max(1),
-                depth_or_array_layers: layers,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: TextureDimension::D2,
-            format: DEPTH_FORMAT,
-            usage: TextureUsages::RENDER_ATTACHMENT
-                | TextureUsages::TEXTURE_BINDING
-                | TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let view = |dimension, layer, count| {
-            texture.create_view(&TextureViewDescriptor {
-                dimension: Some(dimension),
-                base_array_layer: layer,
-                array_layer_count: count,
-                ..TextureViewDescriptor::default()
-            })
-        };
-        let all = view(view_dimension(layout), 0, None);
-        let layers = (0..layers).map(|i| view(TextureViewDimension::D2, i, Some(1)));
-        Self { all, layers: layers.collect(), texture, is_fresh: true }
-    }
-
-    /// Width and height, texels.
-    pub(crate) fn size(&self) -> [u32; 2] {
-        [self.texture.width(), self.texture.height()]
-    }
-
-    /// Whether maps that need this much fit, without leaving more than three quarters of the
-    /// texture unused.
-    fn holds(&self, size: [u32; 2], layers: u32) -> bool {
-        let Extent3d { width, height, depth_or_array_layers } = self.texture.size();
-        let texels =
-            |[w, h]: [u32; 2], layers: u32| u64::from(w) * u64::from(h) * u64::from(layers);
-        let has = texels([width, height], depth_or_array_layers);
-        size[0] <= width
-            && size[1] <= height
-            && layers <= depth_or_array_layers
-            && has <= 4 * texels(size, layers).max(1)
-    }
-
-    /// Width and height, texels, of the texture that will hold maps which need this much.
-    fn size_for(&self, size: [u32; 2], layers: u32) -> [u32; 2] {
-        let Extent3d { width, height, .. } = self.texture.size();
-        if self.holds(size, layers) { [width, height] } else { size }
-    }
-}
-
-impl Buffers {
-    fn new(device: &Device, support: &Support) -> Self {
-        // The arrays in uniform buffers have a fixed length.
-        let [lights, maps, planes] =
-            if support.storage_buffers { [1; 3] } else { [MAX_LIGHTS, MAX_MAPS, MAX_PLANES] };
-        Self {
-            settings: buffer(device, size_of::<data::Settings>(), BufferUsages::UNIFORM),
-            lights: array::<data::Light>(device, support, lights),
-            maps: array::<data::Map>(device, support, maps),
-            planes: array::<[f32; 4]>(device, support, planes),
-        }
-    }
-
-    /// Replaces the buffers that are too small for `lookup`; `true` if any was replaced.
-    fn hold(&mut self, device: &Device, support: &Support, lookup: &Lookup) -> bool {
-        let mut has_grown = false;
-        let mut hold = |buffer: &mut Buffer, bytes: usize| {
-            if buffer.size() < bytes as u64 {
-                *buffer = array::<u8>(device, support, bytes.next_power_of_two());
-                has_grown = true;
-            }
-        };
-        hold(&mut self.lights, size_of_val(lookup.lights.as_slice()));
-        hold(&mut self.maps, size_of_val(lookup.maps.as_slice()));
-        hold(&mut self.planes, size_of_val(lookup.planes.as_slice()));
-        has_grown
-    }
-
-    fn upload(&self, queue: &Queue, lookup: &Lookup) {
-        queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&lookup.settings));
-        queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&lookup.lights));
-        queue.write_buffer(&self.maps, 0, bytemuck::cast_slice(&lookup.maps));
-        queue.write_buffer(&self.planes, 0, bytemuck::cast_slice(&lookup.planes));
-    }
-
-    fn bind(
-        &self,
-        device: &Device,
-        layout: &BindGroupLayout,
-        texture: &TextureView,
-        sampler: &wgpu::Sampler,
-    ) -> BindGroup {
-        let resources = [
-            self.settings.as_entire_binding(),
-            self.lights.as_entire_binding(),
-            self.maps.as_entire_binding(),
-            self.planes.as_entire_binding(),
-            BindingResource::TextureView(texture),
-            BindingResource::Sampler(sampler),
-        ];
-        let entries = (0..).zip(resources);
-        let entries: Vec<_> =
-            entries.map(|(binding, resource)| BindGroupEntry { binding, resource }).collect();
-        device.create_bind_group(&BindGroupDescriptor {
-            label: Some("shadow lookup"),
-            layout,
-            entries: &entries,
-        })
-    }
-}
-
-impl CasterBuffer {
-    fn new(device: &Device, support: &Support) -> Self {
-        let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
-            label: Some("shadow casters"),
-            entries: &[BindGroupLayoutEntry {
-                binding: 0,
-                visibility: ShaderStages::VERTEX,
-                ty: BindingType::Buffer {
-                    ty: BufferBindingType::Uniform,
-                    has_dynamic_offset: true,
-                    min_binding_size: NonZeroU64::new(size_of::<CasterMap>() as u64),
-                },
-                count: None,
-            }],
-        });
-        let stride = (size_of::<CasterMap>() as u32).next_multiple_of(support.uniform_alignment);
-        let buffer = buffer(device, stride as usize, BufferUsages::UNIFORM);
-        let bind_group = Self::bind(device, &layout, &buffer);
-        Self { layout, buffer, bind_group, stride, bytes: Vec::new() }
-    }
-
-    fn bind(device: &Device, layout: &BindGroupLayout, buffer: &Buffer) -> BindGroup {
-        device.create_bind_group(&BindGroupDescriptor {
-            label: Some("shadow casters"),
-            layout,
-            entries: &[BindGroupEntry {
-                binding: 0,
-                resource: BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer,
-                    offset: 0,
-                    size: NonZeroU64::new(size_of::<CasterMap>() as u64),
-                }),
-            }],
-        })
-    }
-
-    fn upload(&mut self, device: &Device, queue: &Queue, records: &[Record]) {
-        let stride = self.stride as usize;
-        self.bytes.clear();
-        self.bytes.resize(stride * records.len(), 0);
-        for (record, bytes) in records.iter().zip(self.bytes.chunks_exact_mut(stride)) {
-            let map = CasterMap { clip_from_render: record.clip_from_render.as_mat4() };
-            bytes[..size_of::<CasterMap>()].copy_from_slice(bytemuck::bytes_of(&map));
-        }
-        if self.buffer.size() < self.bytes.len() as u64 {
-            let bytes = stride * records.len().next_power_of_two();
-            self.buffer = buffer(device, bytes, BufferUsages::UNIFORM);
-            self.bind_group = Self::bind(device, &self.layout, &self.buffer);
-        }
-        queue.write_buffer(&self.buffer, 0, &self.bytes);
-    }
-}
-
-/// The prefilter, if the filter is one.
-fn prefilter(filter: &Filter) -> Option<&Prefilter> {
-    match filter {
-        Filter::Prefiltered(prefilter) => Some(prefilter),
-        Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => None,
-    }
-}
-
 /// Whether the texture unit compares depths.
 fn compares(options: &ShadowOptions) -> bool {
-    options.comparison == Comparison::Hardware && prefilter(&options.filter).is_none()
+    options.comparison == Comparison::Hardware && options.filter.prefilter().is_none()
 }
 
 /// The texture that lookup samples.
@@ -775,13 +558,6 @@ fn looked_up<'a>(
     prefiltering: Option<&'a Prefiltering>,
 ) -> &'a TextureView {
     prefiltering.map_or(&depths.all, Prefiltering::view)
-}
-
-fn view_dimension(layout: Layout) -> TextureViewDimension {
-    match layout {
-        Layout::Atlas => TextureViewDimension::D2,
-        Layout::Layers => TextureViewDimension::D2Array,
-    }
 }
 
 /// Depth state with this comparison, without bias.
@@ -812,7 +588,7 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         buffer(array),
         buffer(array),
         buffer(array),
-        match prefilter(&options.filter) {
+        match options.filter.prefilter() {
             Some(_) => BindingType::Texture {
                 sample_type: TextureSampleType::Float { filterable: true },
                 view_dimension: TextureViewDimension::D2Array,
@@ -824,7 +600,7 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
                 multisampled: false,
             },
         },
-        BindingType::Sampler(match prefilter(&options.filter) {
+        BindingType::Sampler(match options.filter.prefilter() {
             Some(_) => SamplerBindingType::Filtering,
             None if compares(options) => SamplerBindingType::Comparison,
             None => SamplerBindingType::NonFiltering,
@@ -838,20 +614,4 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         label: Some("shadow lookup"),
         entries: &entries,
     })
-}
-
-/// A buffer of this many bytes that the CPU writes.
-fn buffer(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
-    device.create_buffer(&BufferDescriptor {
-        label: Some("shadows"),
-        size: bytes as u64,
-        usage: usage | BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
-/// A buffer for `n` elements that lookup reads.
-fn array<T>(device: &Device, support: &Support, n: usize) -> Buffer {
-    let usage = if support.storage_buffers { BufferUsages::STORAGE } else { BufferUsages::UNIFORM };
-    buffer(device, size_of::<T>() * n, usage)
 }

@@ -5,16 +5,20 @@ use wgpu::{
 };
 
 /// The capabilities of a device that shadows depend on. All decisions about fallbacks are made
-/// here:
+/// here. Without
 ///
-/// | missing on the device | consequence |
-/// | --- | --- |
-/// | [`Features::DEPTH_CLIP_CONTROL`] | the fragment shader clamps the depths of casters in front of a map's depth range and writes them: the same picture, but slower |
-/// | storage buffers in fragment shaders (WebGL2) | uniform buffers, which hold at most 16 lights, 64 maps and 512 planes |
-/// | fetching depths (OpenGL, WebGL2) | [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel` for `hard` and `pcf`; [`Error::Unsupported`] for all other filters |
-/// | array textures with any number of layers (OpenGL) | one more layer where 1 or a multiple of 6 are needed |
-/// | interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures | [`Error::Unsupported`] for the prefilters that store their statistics in such textures |
-/// | both comparison samplers and fetching depths | [`Error::Unsupported`] |
+/// - [`Features::DEPTH_CLIP_CONTROL`], the fragment shader clamps the depths of casters in front of
+///   a map's depth range and writes them: the same picture, but slower;
+/// - storage buffers in fragment shaders (WebGL2), lookups read uniform buffers, which hold at most
+///   16 lights, 64 maps and 512 planes;
+/// - fetching depths (OpenGL, WebGL2), `hard` and `pcf` compare by
+///   [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel`, and all other
+///   filters are [`Error::Unsupported`];
+/// - array textures with any number of layers (OpenGL), there is one more layer where 1 or a
+///   multiple of 6 are needed;
+/// - interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures, the prefilters that
+///   store their statistics in such textures are [`Error::Unsupported`];
+/// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
 ///
 /// Fields are public so that you can force a fallback by setting a field to `false`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -163,6 +163,14 @@ impl Filter {
         &disc::PLACES[..(count as usize).min(disc::MAX_PLACES)]
     }
 
+    /// The prefilter, if the filter is one.
+    pub fn prefilter(&self) -> Option<&Prefilter> {
+        match self {
+            Self::Prefiltered(prefilter) => Some(prefilter),
+            Self::Hard | Self::Pcf { .. } | Self::Spread { .. } | Self::Pcss { .. } => None,
+        }
+    }
+
     /// Percentage-closer filtering over `n` × `n` texels.
     ///
     /// # Errors
