@@ -1,4 +1,4 @@
-//! `umbrage bench`: what each stage of a technique costs.
+//! `umbrage bench` measures the time of each stage of a technique.
 
 use crate::args::bench;
 use crate::output::{aligned, print};
@@ -15,7 +15,7 @@ use umbrage_lab::{
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
 
-/// Frames that do not count: pipelines are compiled and buffers grow.
+/// Number of first frames that do not count, because pipelines are compiled and buffers grow.
 const WARM_UP: u32 = 2;
 
 #[derive(Serialize)]
@@ -34,17 +34,17 @@ struct ResultJson {
     shadows: String,
     backend: &'static str,
     device: Option<String>,
-    /// Whether `depth` and `shade` are the GPU's own times.
+    /// Whether `depth` and `shade` are times from GPU timestamps.
     gpu_timestamps: bool,
     maps: usize,
     texels: u64,
-    /// Of what lookup reads.
+    /// Size of the memory that lookup reads.
     bytes: u64,
     storage_factor: f64,
-    /// What a frame draws into each map, if all are drawn.
+    /// Draws and triangles of each map, in a frame that draws all maps.
     map_draws: Vec<DrawnJson>,
     ms: TimesJson,
-    /// Of the very first frame.
+    /// Times of the very first frame.
     first_ms: FirstJson,
 }
 
@@ -70,7 +70,7 @@ struct FirstJson {
     frame: f64,
 }
 
-/// Milliseconds over frames.
+/// Spread of a time over frames, milliseconds.
 #[derive(Clone, Copy, Serialize)]
 struct Spread {
     min: f64,
@@ -79,7 +79,7 @@ struct Spread {
 }
 
 impl Spread {
-    /// `None` without values.
+    /// Computes the spread of these values; `None` if there are none.
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
@@ -94,7 +94,7 @@ impl Spread {
     }
 }
 
-/// A technique at work.
+/// A technique that is measured, with everything that draws its frames.
 struct Contender<'a> {
     technique: &'a NamedTechnique,
     bencher: Bencher<'a>,
@@ -102,14 +102,14 @@ struct Contender<'a> {
     frames: Vec<Frame>,
 }
 
-/// What one frame cost, milliseconds.
+/// The times of one frame, milliseconds.
 struct Frame {
     plan: f64,
     costs: Costs,
     frame: f64,
 }
 
-/// Measures, and prints a table or JSON.
+/// Measures the techniques, and prints a table or JSON.
 pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let scene = open_scene(&args.scene.name)?;
     let chosen_view = choose_view(&args.view.options(), Some(&scene))?;
@@ -150,7 +150,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     }
 }
 
-/// Draws all frames of all techniques.
+/// Draws all frames of all techniques, which take turns frame by frame.
 fn take_turns(
     contenders: &mut [Contender<'_>],
     args: &bench::Bench,
@@ -161,7 +161,7 @@ fn take_turns(
     let frames = WARM_UP + args.frames;
     let bar = Bar::new(u64::from(frames) * contenders.len() as u64, quiet);
     for index in 0..frames {
-        // Whoever comes first in a frame does not always do so.
+        // The technique that comes first changes from frame to frame.
         let first = index as usize % contenders.len();
         contenders.rotate_left(first);
         for contender in contenders.iter_mut() {
@@ -180,7 +180,7 @@ fn take_turns(
 }
 
 impl Contender<'_> {
-    /// What the frames cost, over those that count.
+    /// The results of this technique, over the frames that count.
     fn result(
         &mut self,
         scene: &Scene,
@@ -216,7 +216,7 @@ impl Contender<'_> {
     }
 }
 
-/// A technique's plan.
+/// Computes the plan of a technique.
 fn made<'a>(
     planner: &'a mut Planner,
     technique: &NamedTechnique,
@@ -227,7 +227,8 @@ fn made<'a>(
     Ok(plan.map_err(|e| technique.blame(e))?)
 }
 
-/// What a frame draws into each map: by the GPU's own account, else what may cast into it.
+/// What a frame draws into each map: the GPU renderer's own counts, or without them the number of
+/// triangles that may cast into the map.
 fn map_draws(plan: &Plan, first: &Costs, scene: &Scene) -> Vec<DrawnJson> {
     let maps = plan.maps.iter();
     let mut map_draws: Vec<DrawnJson> =

@@ -1,4 +1,4 @@
-//! `umbrage compare`: techniques against ray-traced truth, as a report.
+//! `umbrage compare` compares techniques with ray-traced truth, and writes a report.
 
 use crate::args;
 use crate::output::{aligned, command_line, note, print};
@@ -10,7 +10,7 @@ use umbrage_lab::{
 };
 use umbrage_measure::{Measured, Report};
 
-/// Compares, writes the report, and prints a table or the report's JSON.
+/// Compares the techniques, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output, Contents::COMPARISON)?;
     let scene = open_scene(&args.scene.name)?;

@@ -1,4 +1,4 @@
-//! `umbrage devices`: which GPUs there are, and what shadows get from them.
+//! `umbrage devices` lists the GPUs and the features that shadow maps can use on each.
 
 use crate::args::bench;
 use crate::output::{aligned, print};
@@ -13,9 +13,10 @@ struct DeviceJson {
     kind: String,
     driver: String,
     software: bool,
-    /// What it lacks that shadows need; `null` if nothing.
+    /// The missing feature that shadow maps need; `null` if there is none.
     problem: Option<String>,
-    /// `null` where shadows are out of its reach, or it does not say.
+    /// Whether the GPU can clamp depths. Like the other fields below except `timestamps`, this is
+    /// `null` if there is a problem.
     depth_clip_control: Option<bool>,
     storage_buffers: Option<bool>,
     depth_fetch: Option<bool>,
@@ -46,7 +47,7 @@ impl From<AdapterReport> for DeviceJson {
     }
 }
 
-/// Prints the list, the best first.
+/// Prints the list of GPUs, the best first.
 pub(crate) fn run(args: &bench::Devices) -> Result<()> {
     let devices: Vec<DeviceJson> = devices().into_iter().map(DeviceJson::from).collect();
     if args.json {

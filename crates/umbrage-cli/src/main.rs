@@ -1,6 +1,6 @@
-//! The program `umbrage`: how wrong is which shadow mapping technique, where, and at what price.
+//! The program `umbrage` measures the errors and the cost of shadow mapping techniques.
 //!
-//! Two layers: `args` parses and checks, all else constructs and runs.
+//! It has two layers: `args` parses and checks arguments; the other modules run the commands.
 
 mod args;
 mod bench;
@@ -21,7 +21,7 @@ use args::Command;
 use clap::error::ErrorKind;
 use std::process::ExitCode;
 
-/// What shells expect where the command line itself is wrong.
+/// The exit code that shells expect for a wrong command line.
 const USAGE_ERROR: u8 = 2;
 
 fn main() -> ExitCode {
@@ -53,15 +53,15 @@ fn main() -> ExitCode {
     })
 }
 
-/// A layer of Mesa's looks for a desktop to learn which GPU it prefers, and prints an error where
-/// there is none. We choose by ourselves.
+/// Switches off a Vulkan layer of Mesa. The layer asks the desktop which GPU it prefers, and prints
+/// an error if there is no desktop. This program chooses the GPU itself.
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,
     reason = "there is no other way to tell the Vulkan loader to leave a layer out"
 )]
 fn keep_drivers_quiet() {
-    // SAFETY: nothing else runs yet: this is the first that the process does.
+    // SAFETY: no other thread runs yet, because this is the first call in `main`.
     unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
 }
 
@@ -84,7 +84,7 @@ fn start_log(verbose: u8) {
         1 => log::LevelFilter::Info,
         _ => log::LevelFilter::Debug,
     };
-    // That a driver is missing is no error where the CPU does instead; the program says so itself.
+    // A missing driver is no error if the CPU renders instead, and the program reports that itself.
     let drivers = if verbose == 0 { log::LevelFilter::Off } else { level };
     env_logger::Builder::new()
         .filter_level(level)

@@ -1,11 +1,11 @@
-//! Standard output and standard error: what is printed, and in which words.
+//! Prints to standard output and standard error, and words errors for the command line.
 
 use anyhow::{Context, Error, Result};
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
 use umbrage_lab::Field;
 
-/// Writes to standard output. A reader that went away has seen enough: no error.
+/// Writes to standard output. A closed pipe is no error, because its reader has seen enough.
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -14,13 +14,13 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Writes a line to standard error, if anyone listens.
+/// Writes a line to standard error, and ignores failure.
 pub(crate) fn note(line: &str) {
-    // There is nowhere left to complain to.
+    // If standard error fails, there is nowhere left to report it.
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// The command line of this process, to be pasted into a shell.
+/// The command line of this process, quoted so that it can be pasted into a shell.
 pub(crate) fn command_line() -> String {
     let mut words = vec!["umbrage".to_owned()];
     words.extend(std::env::args_os().skip(1).map(|w| quoted(&w.to_string_lossy())));
@@ -36,7 +36,8 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// Rows of equally many cells as lines of text: the first column flush left, the others right.
+/// Formats rows with equal numbers of cells as lines of text. The first column is aligned to the
+/// left, the others to the right.
 pub(crate) fn aligned(rows: &[impl AsRef<[String]>]) -> String {
     let rows: Vec<&[String]> = rows.iter().map(AsRef::as_ref).collect();
     let columns = rows.iter().map(|r| r.len()).max().unwrap_or(0);
@@ -56,7 +57,7 @@ pub(crate) fn aligned(rows: &[impl AsRef<[String]>]) -> String {
     text
 }
 
-/// What a field is called on the command line.
+/// The name of a field on the command line.
 pub(crate) fn option(field: Field) -> String {
     match field {
         Field::Scene | Field::Views => field.name().to_uppercase(),
@@ -64,7 +65,7 @@ pub(crate) fn option(field: Field) -> String {
     }
 }
 
-/// An error and its causes on one line, whatever they say, in the words of the command line.
+/// Formats an error and its causes on one line, with fields named as on the command line.
 pub(crate) fn one_line(error: &Error) -> String {
     let told = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
         Some(error) => umbrage_lab::Error::in_words(error, &option),
@@ -74,7 +75,7 @@ pub(crate) fn one_line(error: &Error) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// As many digits of a number as there is any use in reading.
+/// Rounds a number to six significant digits, which is enough to read.
 pub(crate) fn six_digits(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }

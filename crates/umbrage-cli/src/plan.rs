@@ -1,4 +1,4 @@
-//! `umbrage plan`: the matrices, resolutions and errors that an engine needs.
+//! `umbrage plan` prints the matrices, resolutions and errors that an engine needs.
 
 use crate::args::{self, Fit};
 use crate::output::{print, six_digits};
@@ -21,27 +21,27 @@ struct PlanJson {
     maps: Vec<MapJson>,
     storage_factor: f64,
     texels: u64,
-    /// The first light's.
+    /// Angle θ of the first light.
     theta_deg: f64,
     lights: Vec<LightJson>,
-    /// All maps side by side in one texture; `null` where that is too large for a device.
+    /// All maps side by side in one texture; `null` if it would be too large for a device.
     atlas: Option<AtlasJson>,
-    /// Each map in a layer of its own, with its gutter; `null` as for the atlas.
+    /// Each map with its gutter in a layer of its own; `null` if a layer would be too large.
     layers: Option<LayersJson>,
-    /// Share of the casters that need not be drawn, the mean over maps; `null` without a scene.
+    /// Mean over maps of the share of casters that are culled; `null` without a scene.
     casters_culled: Option<f64>,
 }
 
 #[derive(Serialize)]
 struct LightJson {
-    /// `null`: it has none.
+    /// `null` if the light has no name.
     name: Option<String>,
     theta_deg: f64,
-    /// The first of its maps, and the first of the next light's.
+    /// Indices of the light's first map and of the map after its last.
     maps: [usize; 2],
 }
 
-/// As [`Slab`] has it.
+/// The fields of a [`Slab`].
 #[derive(Serialize)]
 #[serde(untagged)]
 enum SlabJson {
@@ -64,33 +64,34 @@ impl From<Slab> for SlabJson {
 
 #[derive(Serialize)]
 struct MapJson {
-    /// Four columns.
+    /// The four columns of the matrix.
     world_to_shadow: [[f64; 4]; 4],
     resolution: [u32; 2],
-    /// Metres along the view; of side faces, on the face.
+    /// Range of distances that the map serves, metres along the view, or along the face for maps of
+    /// side faces.
     split: [f64; 2],
-    /// `null`: the map serves the whole view.
+    /// Face of the view frustum; `null` if the map is not for one face.
     face: Option<&'static str>,
-    /// `null`: no warp.
+    /// `null` if there is no warp.
     lambda: Option<f64>,
     error: ErrorJson,
-    /// Where receivers lie along the beams, for filters that store functions of depth.
+    /// Range of depths that holds the receivers, for prefilters.
     slab: SlabJson,
-    /// Index along the view, from the viewer.
+    /// Index of the slice, counted from the viewer.
     slice: usize,
     /// Index of the light.
     light: usize,
-    /// Of the cube around a point light; `null` for other lights.
+    /// Side of the cube around a point light; `null` for other lights.
     side: Option<&'static str>,
-    /// Whether there is nothing to serve.
+    /// Whether the map has no receivers to serve, and so no texels.
     empty: bool,
-    /// x, y, width and height in the atlas, texels; `null` without an atlas and for empty maps.
+    /// x, y, width and height in the atlas, texels; `null` for empty maps and without an atlas.
     rect: Option<[u32; 4]>,
-    /// `null` without a scene.
+    /// Numbers of drawn and culled triangles; `null` without a scene.
     casters: Option<MapCasters>,
 }
 
-/// Pixels per texel.
+/// Largest errors of a map, pixels per texel.
 #[derive(Serialize)]
 struct ErrorJson {
     max_s: f64,
@@ -101,7 +102,7 @@ struct ErrorJson {
 #[derive(Serialize)]
 struct AtlasJson {
     size: [u32; 2],
-    /// Around each map, texels.
+    /// Width of the gutter around each map, texels.
     gutter: u32,
 }
 
@@ -111,7 +112,7 @@ struct LayersJson {
     count: u32,
 }
 
-/// A plan, and what follows from it.
+/// A plan with its inputs, its atlas, its layers and its casters.
 struct Planned<'a> {
     technique: &'a NamedTechnique,
     view: &'a ChosenView,
@@ -119,13 +120,13 @@ struct Planned<'a> {
     plan: &'a Plan,
     atlas: Option<Atlas>,
     layers: Option<Atlas>,
-    /// One for each map; without a scene, none.
+    /// Casters of each map; `None` without a scene.
     casters: Option<Vec<MapCasters>>,
-    /// Their share that is culled, the mean over maps.
+    /// Mean over maps of the share of casters that are culled.
     culled: Option<f64>,
 }
 
-/// Plans, and prints the plan.
+/// Computes the plan, and prints it.
 pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let scene = args.scene.as_deref().map(open_scene).transpose()?;
     let view = choose_view(&args.view.options(), scene.as_ref())?;
@@ -135,7 +136,7 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
         tell_notices(scene);
     }
     let receivers = scene.as_ref().map(|scene| match args.fit {
-        // Of all commands this one alone can do without rays.
+        // This is the only command that can work without a ray tracer.
         Fit::Box => Ok(Receivers::in_box(scene)),
         fit => Ok::<_, Error>(Receivers::new(scene, &Tracer::new(scene)?, fit.into())),
     });
@@ -176,7 +177,7 @@ impl<'a> Planned<'a> {
         Self { technique, view, chosen_lights, plan, atlas, layers, casters, culled }
     }
 
-    /// x, y, width and height of a map in the atlas, texels.
+    /// x, y, width and height of a map in the atlas, texels; `None` if it has no place there.
     fn rect(&self, map: usize) -> Option<[u32; 4]> {
         let place = self.atlas.as_ref()?.places[map]?;
         let [width, height] = self.plan.maps[map].resolution;
@@ -271,7 +272,7 @@ impl<'a> Planned<'a> {
             let [near, far] = map.split.map(six_digits);
             line(format_args!("map {i}: {part}{size} texels{place}, {near} to {far} metres"));
             let warp = match (map.lambda, self.technique.technique().warp) {
-                // For light from a point λ is no length in the world.
+                // Under spot and point lights λ is not a length in the world, so it has no unit.
                 (Some(lambda), _) if map.apex.is_some() => format!("λ = {lambda:.6}"),
                 (Some(lambda), _) => format!("λ = {lambda:.6} m"),
                 (None, Warp::Psm) => "the viewer's own perspective".into(),
@@ -297,7 +298,7 @@ impl<'a> Planned<'a> {
         text
     }
 
-    /// What a map is for, as far as there are others.
+    /// Names the light, side, face and slice of a map, as far as these tell it from other maps.
     fn part(&self, part: Part) -> String {
         let name = || self.chosen_lights[part.light].name.clone().unwrap_or_default();
         let slices = self.technique.technique().partition.slices;
@@ -338,7 +339,7 @@ fn side_name(side: CubeSide) -> &'static str {
     }
 }
 
-/// Why all maps are empty.
+/// The message for a plan in which all maps are empty.
 fn nothing_served(view: &ChosenView) -> String {
     let [near, far] = [view.look_at.near, view.look_at.far].map(six_digits);
     format!("nothing lit between {near} and {far} metres of the view receives shadows")

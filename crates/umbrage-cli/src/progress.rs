@@ -1,4 +1,4 @@
-//! A progress bar on standard error, for jobs that take a while.
+//! Shows a progress bar on standard error during long jobs.
 
 use crate::output::note;
 use crate::setup::{log_size, tell_backend, tell_notices};
@@ -9,26 +9,28 @@ use std::time::{Duration, Instant};
 use umbrage_lab::Progress;
 use umbrage_scene::Scene;
 
-/// Jobs shorter than this show no bar.
+/// A job shows no bar until it has taken longer than this.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Steps of the bar for each part of a job.
 const STEPS: u64 = 1000;
 
-/// A bar that appears once a job takes longer than a second, on a terminal. A job has parts that
-/// count alike, and each part has rows of rays.
+/// A progress bar that appears on a terminal once a job takes longer than a second. All parts of a
+/// job take equal lengths of the bar, and each part is divided into rows of rays.
 pub(crate) struct Bar {
     bar: ProgressBar,
     start: Instant,
     shown: Once,
-    /// Parts that are done, and rows of the present one: in all, and done.
+    /// Number of finished parts. `rows` and `rows_done` count all and finished rows of the current
+    /// part.
     parts: AtomicU64,
     rows: AtomicU64,
     rows_done: AtomicU64,
 }
 
 impl Bar {
-    /// A job of one part with so many rows. `quiet` shows no bar, where logs would break it.
+    /// Creates the bar of a job with one part and this many rows. `quiet` hides the bar where log
+    /// lines would break it.
     pub(crate) fn new(rows: u64, quiet: bool) -> Self {
         let bar = Self::of_parts(quiet);
         bar.parts(1);
@@ -36,7 +38,7 @@ impl Bar {
         bar
     }
 
-    /// A job that will say how many parts it has.
+    /// Creates the bar of a job that sets its number of parts later.
     pub(crate) fn of_parts(quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let template = "{prefix}{msg:32} {wide_bar} {percent:>3}% {eta:>4}";
@@ -74,7 +76,7 @@ impl Progress for Bar {
 
     fn advance(&self, rows: u64) {
         if self.start.elapsed() > PATIENCE {
-            // Draws only if standard error is a terminal.
+            // The bar is drawn only if standard error is a terminal.
             self.shown.call_once(|| self.bar.set_draw_target(ProgressDrawTarget::stderr()));
         }
         let done = rows + self.rows_done.fetch_add(rows, Ordering::Relaxed);
@@ -88,7 +90,7 @@ impl Progress for Bar {
         self.bar.set_position(parts * STEPS);
     }
 
-    // What is written to standard error has the bar out of its way.
+    // `suspend` hides the bar while lines are written to standard error.
 
     fn scene(&self, name: &str, scene: &Scene) {
         self.bar.suspend(|| {

@@ -1,4 +1,4 @@
-//! `umbrage render`: one picture.
+//! `umbrage render` renders one picture.
 
 use crate::args::{self, Aov, PictureKind};
 use crate::output::note;
@@ -16,7 +16,8 @@ use umbrage_measure::{
 };
 use umbrage_trace::{View, shade};
 
-/// All that a picture may be made of; what the one asked for does not need stays empty.
+/// All data from which a picture can be made. Fields that the requested picture does not need may
+/// stay empty.
 #[derive(Default)]
 struct Picture {
     counted: Vec<bool>,
@@ -27,7 +28,7 @@ struct Picture {
     noise: Vec<f32>,
 }
 
-/// What a picture is made of.
+/// Which data a picture needs.
 #[derive(Clone, Copy)]
 struct Needs {
     truth: bool,
@@ -35,10 +36,10 @@ struct Needs {
     motion: bool,
 }
 
-/// Frames of the motion that shows minification.
+/// Number of frames of the motion that measures minification.
 const FRAMES: u32 = 8;
 
-/// Renders, and writes the picture.
+/// Renders the picture, and writes it to a file.
 pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let kind = args.picture_kind()?;
     check_file(&args.output)?;
@@ -98,7 +99,7 @@ impl Needs {
         }
     }
 
-    /// How often all of the picture's rows are gone through.
+    /// Number of passes over all rows of the picture, for the progress bar.
     fn passes(self) -> u64 {
         let moving = if self.motion { u64::from(FRAMES) } else { 0 };
         1 + u64::from(self.truth) + u64::from(self.maps) + moving
@@ -106,7 +107,7 @@ impl Needs {
 }
 
 impl Picture {
-    /// Finds out what is needed, but for what moves.
+    /// Renders all data that the picture needs, except the noise of a motion.
     fn trace<'a>(
         args: &args::Render,
         needs: Needs,
@@ -145,7 +146,7 @@ impl Picture {
         Ok(picture)
     }
 
-    /// Writes what was asked for as colours.
+    /// Writes the requested picture as a PNG, in colours.
     fn write_png(self, args: &args::Render, view: &View<'_>) -> Result<()> {
         let path = &args.output;
         let size = view.camera().image();
@@ -189,7 +190,7 @@ impl Picture {
         Ok(write_png(path, &picture)?)
     }
 
-    /// Writes what was asked for as numbers.
+    /// Writes the requested picture as an EXR, in numbers.
     fn write_exr(self, args: &args::Render, size: [u32; 2]) -> Result<()> {
         let path = &args.output;
         let plane = |values: Vec<f32>| Ok(write_exr(path, &Image::new(size, values)?)?);

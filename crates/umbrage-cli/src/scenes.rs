@@ -1,4 +1,4 @@
-//! `umbrage scenes`: what is built in.
+//! `umbrage scenes` lists the built-in scenes.
 
 use crate::args;
 use crate::output::print;
@@ -16,7 +16,7 @@ struct SceneJson {
     max_size: u32,
 }
 
-/// Prints the list.
+/// Prints the list of built-in scenes, as text or JSON.
 pub(crate) fn run(args: &args::Scenes) -> Result<()> {
     if args.json {
         let scenes: Vec<SceneJson> = builtins()

@@ -1,4 +1,4 @@
-//! Scenes and backends by what the arguments say, and what is told of them.
+//! Opens scenes, and prints or logs messages about scenes and backends.
 
 use crate::output::note;
 use anyhow::Result;
@@ -6,14 +6,14 @@ use std::path::Path;
 use umbrage_lab::Executors;
 use umbrage_scene::Scene;
 
-/// The scene of this name.
+/// Opens the scene with this name, and logs its size.
 pub(crate) fn open_scene(name: &str) -> Result<Scene> {
     let scene = umbrage_lab::open_scene(Path::new(""), name)?;
     log_size(name, &scene);
     Ok(scene)
 }
 
-/// Logs how large a scene is.
+/// Logs the numbers of triangles, cameras and lights of a scene.
 pub(crate) fn log_size(name: &str, scene: &Scene) {
     log::info!(
         "{name}: {} triangles drawn, {} stored, {} cameras, {} lights",
@@ -24,21 +24,21 @@ pub(crate) fn log_size(name: &str, scene: &Scene) {
     );
 }
 
-/// Says what was repaired on loading.
+/// Warns of everything that was repaired when the scene was loaded.
 pub(crate) fn tell_notices(scene: &Scene) {
     for notice in &scene.notices {
         log::warn!("{}: {}", scene.name, notice.0);
     }
 }
 
-/// Says what renders, if the choice was ours.
+/// Prints which backend renders, if the program chose it and not the user.
 pub(crate) fn announce(executors: &Executors) {
     if let Some(choice) = executors.choice() {
         tell_backend(choice);
     }
 }
 
-/// Says what was taken to render with.
+/// Prints which backend was chosen.
 pub(crate) fn tell_backend(choice: &str) {
     note(&format!("backend: {choice}"));
 }

@@ -1,4 +1,5 @@
-//! `umbrage sweep`: comparisons in many views, in shares if there are many, with means over all.
+//! `umbrage sweep` compares techniques in many views and takes means over all views. Large sweeps
+//! can be split into shares.
 
 use crate::args;
 use crate::output::{aligned, command_line, note, option, print};
@@ -7,7 +8,7 @@ use anyhow::{Result, ensure};
 use umbrage_lab::{SweepOptions, join_shares, sweep};
 use umbrage_measure::Sweep;
 
-/// Compares what is missing, or joins shares; prints a table or the results' JSON.
+/// Compares in the views that have no results yet, or joins shares. Prints a table or JSON.
 pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
     let techniques = &args.comparison.techniques;
     let options = SweepOptions {

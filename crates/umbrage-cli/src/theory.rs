@@ -1,4 +1,4 @@
-//! `umbrage theory`: the papers' closed forms, in numbers.
+//! `umbrage theory` evaluates the papers' closed forms.
 
 use crate::args::theory::{Aliasing, Form, FrustumArgs, Lambda, Step, Storage, Theory};
 use crate::output::{aligned, print, six_digits};
@@ -9,8 +9,8 @@ use umbrage::theory::{
 };
 use umbrage::{Error, Faces};
 
-/// E at a point, in units of equations 13 and 14 of Zhang, Zhao and Sun 2009. What is infinite is
-/// `null`.
+/// The errors E at a point, in the units of equations 13 and 14 of Zhang, Zhao and Sun 2009.
+/// Infinite values are `null`.
 #[derive(Serialize)]
 struct AliasingJson {
     lambda: Option<f64>,
@@ -25,11 +25,11 @@ struct AliasingJson {
     f_p: f64,
     #[serde(flatten)]
     errors: ErrorsJson<f64>,
-    /// Over the view.
+    /// Smallest errors over the view.
     least: ErrorsJson<ExtremumJson>,
-    /// Over the view.
+    /// Largest errors over the view.
     largest: ErrorsJson<ExtremumJson>,
-    /// Of the slope asked for.
+    /// Factors of the projection error, for the slope of `--slope`.
     #[serde(skip_serializing_if = "Option::is_none")]
     projection: Option<ProjectionJson>,
 }
@@ -51,7 +51,8 @@ struct ExtremumJson {
     z: f64,
 }
 
-/// Infinite, `null`, along the light.
+/// Factors of the projection error. A factor is infinite, so `null`, where the slope runs along the
+/// light.
 #[derive(Serialize)]
 struct ProjectionJson {
     #[serde(rename = "E_q")]
@@ -67,7 +68,7 @@ struct StorageJson {
 
 #[derive(Serialize)]
 struct LambdaJson {
-    /// `null`: no warp.
+    /// `null` if there is no warp.
     lambda: Option<f64>,
 }
 
@@ -76,7 +77,7 @@ struct StepJson {
     visibility: f64,
 }
 
-/// Computes, and prints the numbers.
+/// Evaluates the chosen closed form, and prints the results.
 pub(crate) fn run(args: &Theory) -> Result<()> {
     match &args.form {
         Form::Aliasing(args) => aliasing(args),
@@ -225,7 +226,7 @@ fn tilted(args: FrustumArgs, theta_degrees: f64) -> Result<Tilted> {
     Tilted::new(view(args)?, theta_degrees.to_radians()).map_err(|e| option_error(&e))
 }
 
-/// An error of the library, naming the option that it is about.
+/// Turns an error of the library into one that names the command-line option at fault.
 fn option_error(error: &Error) -> anyhow::Error {
     let Error::Invalid { field, problem } = error else {
         return anyhow!("{error}");
@@ -249,7 +250,7 @@ fn finite(x: f64) -> Option<f64> {
     Some(x).filter(|x| x.is_finite())
 }
 
-/// Six digits, with an exponent where the number is huge or tiny.
+/// Formats a number with six digits, and with an exponent if it is very large or very small.
 fn digits(x: f64) -> String {
     format!("{:?}", six_digits(x))
 }

@@ -1,10 +1,10 @@
-//! Values that users give: checked numbers, vectors, sizes, from the command line as text.
+//! Parses and checks values from the command line: numbers, vectors, sizes and shares.
 
 use anyhow::{Error, Result, anyhow, bail};
 use glam::DVec3;
 use umbrage_lab::{Share, values};
 
-/// Three numbers with commas between them.
+/// Parses three finite numbers with commas between them.
 pub(crate) fn vector(text: &str) -> Result<DVec3> {
     let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
     match numbers[..] {
@@ -15,17 +15,17 @@ pub(crate) fn vector(text: &str) -> Result<DVec3> {
     }
 }
 
-/// A vector with a length, from three numbers with commas between them.
+/// Parses a vector that is not zero, from three numbers with commas between them.
 pub(crate) fn direction(text: &str) -> Result<DVec3> {
     values::pointing(vector(text)?).map_err(Error::msg)
 }
 
-/// A number above zero.
+/// Parses a positive distance in metres.
 pub(crate) fn distance(text: &str) -> Result<f64> {
     values::metres(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
-/// An error in pixels per texel.
+/// Parses an error in pixels per texel, > 0 and at most 10¹².
 pub(crate) fn pixels_per_texel(text: &str) -> Result<f64> {
     match text.parse() {
         Ok(p) if p > 0.0 && p <= 1e12 => Ok(p),
@@ -33,20 +33,20 @@ pub(crate) fn pixels_per_texel(text: &str) -> Result<f64> {
     }
 }
 
-/// An angle in degrees that a picture can have.
+/// Parses a field of view, 0.01 to 179 degrees.
 pub(crate) fn field_of_view(text: &str) -> Result<f64> {
     values::opening(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
-/// Width and height of a picture, pixels.
+/// Parses the width and height of a picture, pixels.
 pub(crate) fn picture_size(text: &str) -> Result<[u32; 2]> {
-    // A side that is no number is as wrong as one of no pixels.
+    // A side that is not a number counts as 0 pixels, which the check below rejects.
     let side = |n: &str| n.parse().unwrap_or(0);
     let size = text.split_once('x').map_or([0; 2], |(w, h)| [side(w), side(h)]);
     values::pixels(size).map_err(Error::msg)
 }
 
-/// Which of how many equal shares.
+/// Parses a share I/N: the I-th of N equal shares.
 pub(crate) fn share(text: &str) -> Result<Share> {
     let share = text.split_once('/').and_then(|(index, count)| {
         Some(Share { index: index.parse().ok()?, count: count.parse().ok()? })

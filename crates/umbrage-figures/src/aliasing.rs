@@ -1,4 +1,5 @@
-//! Theory's Fig. 3: errors over a side view of V, and what they do to the shadows of a scene.
+//! Fig. 3 of Zhang, Zhao and Sun 2009 ("Theory"): errors over a side view of the view frustum V,
+//! and the shadows of a scene that these maps give.
 
 use crate::figure::{Figure, File};
 use crate::planned::{Planned, from_before};
@@ -23,31 +24,33 @@ const TECHNIQUES: [(&str, Rule); 4] = [
     ("TSM", Rule::Tsm { focus: None }),
     ("adaptive", Rule::Adaptive(Objective::Storage)),
 ];
-/// One of the errors, or both.
+/// Selects one of the two errors, or their product.
 type Pick = fn(Errors) -> f64;
 
 const ERRORS: [(&str, Pick); 3] =
     [("E_p, along the map", |e| e.p), ("E_q, across", |e| e.q), ("E_p · E_q", |e| e.product())];
 
-/// Texels in which nothing lies before the end of what the map serves.
+/// Colour of texels in which no surface lies in front of the far end of the map's depth range.
 const EMPTY: Rgb = [205, 222, 240];
-/// Texels and pixels each way of map and picture: few, so that errors show as stairs.
+/// Width and height of the map in texels and of the picture in pixels. They are small, so that
+/// errors show as jagged edges.
 const SIDE: u32 = 256;
-/// The colours' ends, as powers of 5.
+/// Both ends of the colour scale, as exponents of 5.
 const POWERS: [f64; 2] = [0.0, 5.0];
 
-/// Pixels a metre in side views.
+/// Pixels of the page per metre in side views.
 const PER_METRE: f64 = 1.7;
-/// Side view's picture's pixels for one of the page.
+/// Image pixels of a side view per pixel of the page, along each axis.
 const FINENESS: f64 = 2.0;
-/// Distance of panels from each other, and sizes of what surrounds them.
+/// Gap between panels, then the sizes of the left margin, the top margin, the colour bar's column
+/// and the bottom margin, pixels.
 const GAP: i32 = 14;
 const LEFT: i32 = 118;
 const TOP: i32 = 26;
 const BAR: i32 = 86;
 const FOOT: i32 = 34;
 
-/// One technique under one light: the closed form and the planned map.
+/// The closed form and the planned map of one technique under one light.
 struct Case {
     warped: Warped,
     planned: Planned,
@@ -62,7 +65,7 @@ impl Case {
     }
 }
 
-/// Theory, Fig. 3.
+/// Makes Fig. 3 of Theory.
 pub(crate) fn theory_fig3() -> Result<Figure> {
     let view = View::new(1.0, 100.0, FRAC_PI_6)?;
     let scene = scene()?;
@@ -133,7 +136,7 @@ pub(crate) fn theory_fig3() -> Result<Figure> {
     })
 }
 
-/// Points all over V: (y, z), metres.
+/// Sample points (y, z) spread over V, metres.
 fn samples(view: View) -> impl Iterator<Item = (f64, f64)> {
     (0..=8).flat_map(move |i| {
         let z = view.near() * (view.far() / view.near()).powf(f64::from(i) / 8.0);
@@ -141,7 +144,7 @@ fn samples(view: View) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// 25 statues, most of what there is below the line of sight, from near to the middle of V.
+/// A scene of 25 statues, mostly below the line of sight, from the near part of V to its middle.
 fn scene() -> Result<Scene> {
     let mut scene = umbrage_scene::builtin("statues", Some(5))?;
     let stand = DAffine3::from_scale_rotation_translation(
@@ -155,9 +158,9 @@ fn scene() -> Result<Scene> {
     Ok(scene)
 }
 
-/// Where things are on the page, pixels.
+/// Positions of the panels on the page, pixels.
 struct Layout {
-    /// Size of a side view.
+    /// Width and height of a side view.
     side_view: [i32; 2],
 }
 
@@ -172,8 +175,8 @@ impl Layout {
         TOP + i as i32 * (self.side_view[1] + GAP)
     }
 
-    /// Left edges: three side views, the map, the picture. The last two are as wide as all are
-    /// high.
+    /// The left edge of a column: three side views, the map and the picture. All panels have the
+    /// same height, and the map and the picture are square.
     fn column(&self, i: usize) -> i32 {
         let [width, height] = self.side_view;
         let i = i as i32;
@@ -186,7 +189,7 @@ impl Layout {
     }
 }
 
-/// All techniques under one light, as SVG.
+/// Draws the panels of all techniques under one light as SVG.
 fn sheet(view: View, degrees: f64, cases: &[Case], tracer: &Tracer<'_>) -> Result<String> {
     let layout = Layout::new(view);
     let [width, height] = layout.side_view;
@@ -236,12 +239,12 @@ fn sheet(view: View, degrees: f64, cases: &[Case], tracer: &Tracer<'_>) -> Resul
     Ok(svg)
 }
 
-/// The colours' scale, from `top` to `bottom`.
+/// Draws the colour bar from `top` to `bottom`.
 fn bar(area: &chart::Area<'_>, left: i32, top: i32, bottom: i32) -> Result<()> {
     let height = bottom - top;
     for y in 0..height {
         let share = 1.0 - f64::from(y) / f64::from(height);
-        // To the end: where each only touched the next, seams would show.
+        // Each rectangle reaches to the bottom. Rectangles that only touch would show seams.
         let corners = [(left, top + y), (left + 16, bottom)];
         area.draw(&Rectangle::new(corners, chart::viridis(share).filled()))?;
     }
@@ -260,12 +263,12 @@ fn bar(area: &chart::Area<'_>, left: i32, top: i32, bottom: i32) -> Result<()> {
     Ok(())
 }
 
-/// Where an error lies on the colours' scale, as a share.
+/// The position of an error on the colour scale, as a fraction of its length.
 fn place(error: f64) -> f64 {
     (error.ln() / 5_f64.ln() - POWERS[0]) / (POWERS[1] - POWERS[0])
 }
 
-/// The measured error over V.
+/// A picture of the measured error over a side view of V.
 fn side_view(view: View, case: &Case, error: Pick) -> Result<Image<Rgb>> {
     let per_metre = PER_METRE * FINENESS;
     let [width, height] = Layout::new(view).side_view.map(|n| (f64::from(n) * FINENESS) as u32);
@@ -280,12 +283,12 @@ fn side_view(view: View, case: &Case, error: Pick) -> Result<Image<Rgb>> {
     })?)
 }
 
-/// The closed form's lines at powers of 5.
+/// Contour lines of the closed form at powers of 5, as an SVG path.
 fn lines(view: View, case: &Case, error: Pick, [left, top]: [i32; 2]) -> Result<String> {
     const COLUMNS: usize = 100;
     const ROWS: usize = 60;
     let middle = f64::from(Layout::new(view).side_view[1]) / 2.0;
-    // Rows of the grid fan out with V.
+    // The rows of the grid spread apart with z, as V does.
     let at = |[column, row]: [f64; 2]| {
         let z = view.near() + (view.far() - view.near()) * column / (COLUMNS - 1) as f64;
         (z * view.tan_phi() * (2.0 * row / (ROWS - 1) as f64 - 1.0), z)
@@ -309,11 +312,11 @@ fn lines(view: View, case: &Case, error: Pick, [left, top]: [i32; 2]) -> Result<
     Ok(format!("<path d=\"{path}\" stroke=\"white\" stroke-width=\"0.8\" fill=\"none\"/>\n"))
 }
 
-/// The way of the light, in the upper left corner of a side view.
+/// An arrow along the light direction, in the upper left corner of a side view.
 fn arrow(theta_rad: f64, [left, top]: [i32; 2]) -> Result<String> {
     let (sin, cos) = theta_rad.sin_cos();
     let [from_x, from_y] = [f64::from(left) + 34.0, f64::from(top) + 8.0];
-    // Page coordinates: z to the right, y upwards.
+    // In a side view z runs to the right and y upwards.
     let along = |length: f64, aside: f64| {
         (from_x - cos * length + sin * aside, from_y + sin * length + cos * aside)
     };
@@ -327,7 +330,7 @@ fn arrow(theta_rad: f64, [left, top]: [i32; 2]) -> Result<String> {
     Ok(format!("<path d=\"{path}\" stroke=\"black\" stroke-width=\"1.4\" fill=\"none\"/>\n"))
 }
 
-/// The part of the view whose shadows are shown.
+/// A camera with a narrower field of view that shows a detail of the shadows.
 fn detail() -> Result<Camera> {
     Ok(Camera::look_at(LookAt {
         eye: DVec3::ZERO,
@@ -340,7 +343,7 @@ fn detail() -> Result<Camera> {
     })?)
 }
 
-/// The shadow map of the scene, and a picture with its shadows.
+/// Renders the scene's shadow map, and a picture of its shadows.
 fn executed(
     view: View,
     theta_rad: f64,
@@ -359,7 +362,7 @@ fn executed(
     let reference = Reference::render(tracer, plan, &|_| {})?;
 
     let map = &reference.depth_maps()[0];
-    // What lies nearer to the light than V is at depth 0, empty texels at 1.
+    // Surfaces nearer to the light than V have depth 0, and empty texels have depth 1.
     let texel = |column: u32, row: u32| map.texel(column as i32, (SIDE - 1 - row) as i32);
     let image = Image::from_fn([SIDE; 2], texel)?;
     let depths = || image.pixels().iter().copied().filter(|&d| d < 1.0);

@@ -1,37 +1,37 @@
-//! Axes and colour bars, even or logarithmic.
+//! Linear and logarithmic axes of charts and colour bars.
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use std::ops::Range;
 
-/// How numbers are laid out along an axis.
+/// How values are spread along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scale {
     Linear,
     Log,
 }
 
-/// An axis, or a colour bar.
+/// An axis of a chart, or the scale of a colour bar.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
-    /// Words beside it.
+    /// Text beside the axis.
     pub(crate) label: String,
     range: [f64; 2],
     scale: Scale,
 }
 
 impl Axis {
-    /// Even steps are even lengths.
+    /// Creates a linear axis, on which equal differences take equal lengths.
     pub(crate) fn linear(label: &str, range: [f64; 2]) -> Self {
         Self { label: label.to_owned(), range, scale: Scale::Linear }
     }
 
-    /// Even ratios are even lengths; both ends must be positive.
+    /// Creates a logarithmic axis, on which equal ratios take equal lengths. Both ends must be > 0.
     pub(crate) fn log(label: &str, range: [f64; 2]) -> Self {
         Self { label: label.to_owned(), range, scale: Scale::Log }
     }
 
-    /// The value a share of 0 to 1 along the axis.
+    /// The value at a fraction `share` of the axis's length, 0 to 1.
     pub(crate) fn at(&self, share: f64) -> f64 {
         let [a, b] = self.range.map(|v| self.place(v));
         let placed = a + (b - a) * share;
@@ -39,16 +39,16 @@ impl Axis {
             Scale::Linear => placed,
             Scale::Log => 10_f64.powf(placed),
         };
-        // Rounding must not leave the axis, where there may be no formula.
+        // Rounding must not leave the range: closed forms may be undefined outside it.
         value.clamp(self.range[0], self.range[1])
     }
 
-    /// `count` values along the axis, both ends among them.
+    /// `count` values at equal lengths along the axis, including both ends.
     pub(crate) fn samples(&self, count: usize) -> Vec<f64> {
         (0..count).map(|i| self.at(i as f64 / (count - 1) as f64)).collect()
     }
 
-    /// Where a value lies before the axis is stretched to its length.
+    /// The value itself on a linear axis, or its decimal logarithm on a logarithmic axis.
     fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
@@ -56,13 +56,13 @@ impl Axis {
         }
     }
 
-    /// Where a value lies, as a share of the axis.
+    /// The position of a value as a fraction of the axis's length.
     pub(crate) fn share(&self, value: f64) -> f64 {
         let [a, b, v] = [self.range[0], self.range[1], value].map(|v| self.place(v));
         (v - a) / (b - a)
     }
 
-    /// Round numbers, about `count`.
+    /// About `count` round numbers at which the axis has tick marks.
     fn marks(&self, count: usize) -> Vec<f64> {
         let [a, b] = self.range;
         if self.scale == Scale::Linear {
@@ -88,7 +88,7 @@ impl Ranged for Axis {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        // A curve may leave the chart; far outside is all alike.
+        // Curves may leave the chart. Far outside it, their exact position makes no difference.
         let share = self.share(*value).clamp(-10.0, 10.0);
         limit.0 + (f64::from(limit.1 - limit.0) * share).round() as i32
     }
@@ -104,17 +104,17 @@ impl Ranged for Axis {
 
 impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, value: &f64) -> String {
-        // Marks of linear axes are sums: rounding makes something tiny of their zero.
+        // Tick marks of linear axes are sums, so that rounding can turn zero into a tiny number.
         let [a, b] = self.range;
         let is_zero = self.scale == Scale::Linear && value.abs() < 1e-9 * (b - a).abs();
         number(if is_zero { 0.0 } else { *value })
     }
 }
 
-/// A round number in few letters: powers of ten where it is long.
+/// Formats a round number briefly, with a power of ten if it is very large or very small.
 fn number(value: f64) -> String {
     if value == 0.0 || (1e-3..1e4).contains(&value.abs()) {
-        // Marks of even axes are sums, with rounding at their ends.
+        // Tick marks of linear axes are sums with rounding errors in their last digits.
         return format!("{}", (value * 1e6).round() / 1e6);
     }
     let exponent = value.abs().log10().floor();
@@ -124,7 +124,7 @@ fn number(value: f64) -> String {
     if factor == 1.0 { power } else { format!("{factor}·{power}") }
 }
 
-/// What follows the 10 of a power of ten, raised.
+/// Turns the `i`-th character of a power of ten into superscript if it belongs to the exponent.
 fn superscript(i: usize, c: char) -> char {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     match c.to_digit(10) {

@@ -1,6 +1,6 @@
-//! Line charts as SVG, and what every drawing shares, all in one style: Okabe and Ito's colours for
-//! curves, viridis for fields, both safe for the colour-blind; lines for closed forms, markers for
-//! what was measured.
+//! Draws line charts as SVG, and holds the style that all drawings share. Curves have Okabe and
+//! Ito's colours and heat maps have viridis; both are safe for the colour-blind. Lines show closed
+//! forms, and markers show measured values.
 
 use crate::axis::Axis;
 use anyhow::Result;
@@ -12,10 +12,10 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(crate) type Context<'a, 'b> = ChartContext<'b, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
 
-/// Size of a line chart, pixels, the legend's column at its right included.
+/// Width and height of a line chart in pixels, including the legend's column at its right.
 const SIZE: (u32, u32) = (880, 480);
 const LEGEND_WIDTH: u32 = 230;
-/// Height of the title above what is drawn, pixels.
+/// Height of the title's strip above a drawing, pixels.
 pub(crate) const TITLE_HEIGHT: u32 = 34;
 
 /// Okabe and Ito's palette without its yellow, which is faint on white.
@@ -29,7 +29,7 @@ pub(crate) const COLORS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
 ];
 
-/// Viridis at nine even steps.
+/// The viridis colour map, sampled at nine equidistant places.
 const VIRIDIS: [RGBColor; 9] = [
     RGBColor(68, 1, 84),
     RGBColor(71, 44, 122),
@@ -42,8 +42,8 @@ const VIRIDIS: [RGBColor; 9] = [
     RGBColor(253, 231, 37),
 ];
 
-/// One colour of a line chart: a line for the closed form, markers for what was measured, either
-/// may be empty.
+/// A curve of a line chart: a line for the closed form and markers for measured values, in one
+/// colour. Either may be empty.
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     name: String,
@@ -54,7 +54,7 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// Without points.
+    /// Creates a curve without points.
     pub(crate) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -65,44 +65,44 @@ impl Curve {
         }
     }
 
-    /// With the closed form's points, joined by a line.
+    /// Sets the points of the closed form, which a line joins.
     pub(crate) fn line(self, line: impl IntoIterator<Item = [f64; 2]>) -> Self {
         Self { line: line.into_iter().collect(), ..self }
     }
 
-    /// With measured points, each a marker.
+    /// Sets the measured points, which are drawn as markers.
     pub(crate) fn markers(self, markers: impl IntoIterator<Item = [f64; 2]>) -> Self {
         Self { markers: markers.into_iter().collect(), ..self }
     }
 
-    /// With a dashed line.
+    /// Makes the line dashed.
     pub(crate) fn dashed(self) -> Self {
         Self { dashed: true, ..self }
     }
 
-    /// In the i-th colour, not that of its place in the chart.
+    /// Sets the i-th colour. The default colour follows from the curve's index in the chart.
     pub(crate) fn color(self, i: usize) -> Self {
         Self { color: Some(i), ..self }
     }
 }
 
-/// A chart of curves with a legend beside it.
+/// A chart of several curves, with a legend beside it.
 #[derive(Clone, Debug)]
 pub(crate) struct LineChart {
-    /// What is shown, and of what.
+    /// Title above the chart.
     pub(crate) title: String,
-    /// To the right.
+    /// Horizontal axis.
     pub(crate) x: Axis,
-    /// Upwards.
+    /// Vertical axis.
     pub(crate) y: Axis,
-    /// In the legend's order.
+    /// Curves, in the order of the legend.
     pub(crate) curves: Vec<Curve>,
-    /// Words in the chart, each in the middle of a place.
+    /// Notes inside the chart, each with the point (x, y) at which its text is centred.
     pub(crate) notes: Vec<([f64; 2], String)>,
 }
 
 impl LineChart {
-    /// The SVG's text.
+    /// Draws the chart, and returns the SVG's text.
     pub(crate) fn svg(&self) -> Result<String> {
         draw(SIZE, &self.title, |area| {
             let (plot, legend) = area.split_horizontally(SIZE.0 - LEGEND_WIDTH);
@@ -131,7 +131,7 @@ impl LineChart {
             chart.draw_series(LineSeries::new(points, color.stroke_width(2)))?;
         }
         for &[x, y] in &curve.markers {
-            // What lies outside would be drawn over the legend.
+            // Markers outside the plot could be drawn over the legend.
             if [self.x.share(x), self.y.share(y)].iter().all(|s| (-0.01..=1.01).contains(s)) {
                 chart.draw_series([EmptyElement::at((x, y)) + marker(i, color)])?;
             }
@@ -171,7 +171,7 @@ impl LineChart {
     }
 }
 
-/// The i-th curve's marker; shapes differ, so that they can be told apart in grey.
+/// The marker of the i-th curve. Shapes alternate, so that markers can be told apart in grey.
 fn marker<'a>(i: usize, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, (i32, i32)> {
     match i % 3 {
         0 => Circle::new((0, 0), 4, color.filled()).into_dyn(),
@@ -180,7 +180,7 @@ fn marker<'a>(i: usize, color: RGBColor) -> DynElement<'static, SVGBackend<'a>, 
     }
 }
 
-/// The colour of a share of 0 to 1.
+/// The viridis colour for a value of 0 to 1. Values outside are clamped.
 pub(crate) fn viridis(share: f64) -> RGBColor {
     let at = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
@@ -191,12 +191,12 @@ pub(crate) fn viridis(share: f64) -> RGBColor {
     RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }
 
-/// Black words of this size, pixels.
+/// The style of black text of this size, pixels.
 pub(crate) fn text(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_text_style(&(1, 1)).color(&BLACK)
 }
 
-/// An SVG with a title, drawn below it.
+/// Creates an SVG with a title, below which `content` draws.
 pub(crate) fn draw(
     size: (u32, u32),
     title: &str,
@@ -205,7 +205,7 @@ pub(crate) fn draw(
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        // Dark pages show pictures too.
+        // The background is white, so that the drawing is legible on dark pages too.
         area.fill(&WHITE)?;
         area.draw(&Text::new(title.to_owned(), (12, 10), text(17)))?;
         content(&area.margin(TITLE_HEIGHT, 0, 0, 0))?;
@@ -214,7 +214,7 @@ pub(crate) fn draw(
     Ok(svg)
 }
 
-/// A frame with axes, about so many marks on each.
+/// Draws a frame with axes, with about `marks_x` and `marks_y` tick marks.
 pub(crate) fn axes<'a, 'b>(
     area: &Area<'a>,
     x: &Axis,

@@ -1,8 +1,8 @@
-//! Lines of equal value of a smooth field, by marching triangles.
+//! Finds contour lines of a smooth field by marching triangles.
 
-/// Segments along which a field has the value `level`, in the field's own coordinates. `values` are
-/// on a grid of `columns` points a row; cells are cut into two triangles, along which the field is
-/// taken as flat.
+/// Line segments along which a field has the value `level`, in the coordinates (column, row) of the
+/// grid. `values` holds the grid row by row, with `columns` points in a row. Each cell is cut into
+/// two triangles, in which the field is interpolated linearly.
 pub(crate) fn segments(values: &[f64], columns: usize, level: f64) -> Vec<[[f64; 2]; 2]> {
     let rows = values.len() / columns;
     let mut found = Vec::new();
@@ -20,11 +20,11 @@ pub(crate) fn segments(values: &[f64], columns: usize, level: f64) -> Vec<[[f64;
     found
 }
 
-/// Where a triangle of (place, height) is cut at height 0.
+/// The segment along which a triangle with corners (position, value) has the value 0, if any.
 fn cut(triangle: [([f64; 2], f64); 3]) -> Option<[[f64; 2]; 2]> {
     let edges = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| {
         let ((p, a), (q, b)) = (triangle[i], triangle[j]);
-        // A corner at 0 itself counts as above, so that each line crosses two edges or none.
+        // A corner with value 0 counts as positive, so that the contour crosses two edges or none.
         ((a >= 0.0) != (b >= 0.0)).then(|| {
             let share = a / (a - b);
             [0, 1].map(|k| p[k] + (q[k] - p[k]) * share)

@@ -1,5 +1,5 @@
-//! Convolution shadow maps' figures: the Fourier step and its trade-offs, and what it makes of
-//! shadows.
+//! Figures 3 and 6 of the paper on convolution shadow maps (CSM; Annen et al. 2007): the Fourier
+//! series of the shadow test, its trade-offs, and the shadows that it gives.
 
 use crate::axis::Axis;
 use crate::chart::{self, Curve, LineChart};
@@ -17,9 +17,9 @@ const PLAIN: StepAt = StepAt { offset: false, scale: false };
 const OFFSET: StepAt = StepAt { offset: true, scale: false };
 const SCALE: StepAt = StepAt { offset: false, scale: true };
 
-/// The shadow test as a map stores it: sines and cosines of the occluder's depth z, rounded to 8
-/// bits with sign, times those of the receiver's depth d (CSM Eqs. 13 and 14, with the step's sign
-/// put right). Before the clamp.
+/// The shadow test before the clamp, computed from stored basis images: sines and cosines of the
+/// occluder's depth z, rounded to signed 8 bits, are multiplied by those of the receiver's depth d
+/// (CSM Eqs. 13 and 14, with the sign of the step corrected).
 fn from_basis_images(order: u32, attenuation: f64, receiver: f64, occluder: f64) -> f64 {
     let stored = |value: f64| (value * 127.0).round() / 127.0;
     let terms = (1..=order).map(f64::from).map(|k| {
@@ -31,10 +31,10 @@ fn from_basis_images(order: u32, attenuation: f64, receiver: f64, occluder: f64)
     0.5 + terms.sum::<f64>()
 }
 
-/// Depth of the occluder in Fig. 3, where 8 bits hold no sine exactly.
+/// Depth of the occluder in Fig. 3. At this depth no sine is exact in 8 bits.
 const OCCLUDER: f64 = 0.47;
 
-/// A step with what is done to it, for both ways to compute it.
+/// The parameters of a Fourier step, which is computed in closed form and from basis images.
 #[derive(Clone, Copy)]
 struct Variant {
     order: u32,
@@ -51,19 +51,19 @@ impl Variant {
         Ok(FourierStep::new(self.order, self.attenuation)?)
     }
 
-    /// Offset and scale, as numbers.
+    /// The offset that is added to z − d, and the factor that multiplies the sum.
     fn adjustment(self) -> Result<[f64; 2]> {
         let offset = if self.at.offset { self.step()?.offset() } else { 0.0 };
         Ok([offset, if self.at.scale { 2.0 } else { 1.0 }])
     }
 
-    /// The sum at z − d = `x`, before the clamp: closed form.
+    /// The closed form of the sum at z − d = `x`, before the clamp.
     fn closed(self, x: f64) -> Result<f64> {
         let [offset, scale] = self.adjustment()?;
         Ok(scale * self.step()?.series(x + offset))
     }
 
-    /// The same from 8-bit basis images.
+    /// The same sum at z − d = `x`, computed from 8-bit basis images.
     fn stored(self, x: f64) -> Result<f64> {
         let [offset, scale] = self.adjustment()?;
         Ok(scale * from_basis_images(self.order, self.attenuation, OCCLUDER - x - offset, OCCLUDER))
@@ -78,10 +78,10 @@ impl Variant {
     }
 }
 
-/// What a chart shows, with names.
+/// The five curves of a chart, each with its name in the legend.
 type Variants = [(String, Variant); 5];
 
-/// CSM, Fig. 3.
+/// Makes Fig. 3 of CSM.
 pub(crate) fn fig3() -> Result<Figure> {
     let of_order =
         |attenuation, at| ORDERS.map(|m| (format!("M = {m}"), Variant::new(m, attenuation, at)));
@@ -161,14 +161,14 @@ pub(crate) fn fig3() -> Result<Figure> {
     })
 }
 
-/// Depths in the scene of Fig. 6: the ground, the squares over it, and the slanted polygon's far
-/// end.
+/// The scene of Fig. 6: the depth of the ground, then the heights above it of the low square, the
+/// high square and the upper end of the slanted polygon. The depth range is 1.
 const GROUND: f64 = 0.9;
 const LOW: f64 = 0.15;
 const HIGH: f64 = 0.45;
 const SLANT: f64 = 0.5;
 
-/// CSM, Fig. 6.
+/// Makes Fig. 6 of CSM.
 pub(crate) fn fig6() -> Result<Figure> {
     let mut table = Table::new(&["order", "adjustment", "gap", "light", "light_measured"])?;
     let gaps = Axis::linear("height of the occluder over the receiver, z-range = 1", [0.0, SLANT]);
@@ -224,7 +224,8 @@ pub(crate) fn fig6() -> Result<Figure> {
     })
 }
 
-/// The built-in scene, with each order, shifted by the offset and doubled.
+/// Renders the built-in scene `contacts` with each order, once with the offset and once with
+/// scaling by 2.
 fn rendered() -> Result<String> {
     let scene = umbrage_scene::builtin("contacts", None)?;
     let tracer = Tracer::new(&scene)?;
@@ -237,20 +238,21 @@ fn rendered() -> Result<String> {
     sheet("How many terms a shadow needs", ORDERS.len(), &pictures.collect::<Result<Vec<_>>>()?)
 }
 
-/// Light on the ground under an occluder this much nearer to the light.
+/// The visibility of the ground under an occluder that is nearer to the light by `gap`.
 fn shadow(order: u32, at: StepAt, gap: f64) -> Result<f64> {
     Ok(FourierStep::new(order, 0.0)?.visibility(GROUND, GROUND - gap, at)?)
 }
 
-/// The ground seen along the light, a column an order, a row a way to put lit surfaces right.
+/// Draws the ground as seen along the light direction. Each column has one order, and the two rows
+/// have the offset and the scaling.
 fn pictures() -> Result<String> {
     const SIDE: i32 = 150;
     const STEP: i32 = 164;
     const LEFT: i32 = 70;
     const TOP: i32 = 28;
-    /// Height of a strip of the slanted polygon.
+    /// Height of one strip of the slanted polygon, pixels.
     const STRIP: i32 = 2;
-    /// Each object's left and top edge, width and height.
+    /// Left edge, top edge, width and height of each object, pixels.
     const UPPER: [i32; 4] = [12, 12, 50, 50];
     const LOWER: [i32; 4] = [12, 88, 50, 50];
     const POLYGON: [i32; 4] = [86, 12, 50, 126];
@@ -270,7 +272,7 @@ fn pictures() -> Result<String> {
                         area.draw(&Text::new(format!("M = {m}"), (x + SIDE / 2, y - 6), style))?;
                     }
                     let rectangle = |[left, top, width, height]: [i32; 4], gap| -> Result<()> {
-                        // Lit ground is a bit darker than the page.
+                        // Lit ground must be a bit darker than the page.
                         let grey = (30.0 + 205.0 * shadow(m, at, gap)?).round() as u8;
                         let corner = (x + left, y + top);
                         let corners = [corner, (corner.0 + width, corner.1 + height)];
@@ -282,7 +284,7 @@ fn pictures() -> Result<String> {
                     rectangle(LOWER, LOW)?;
                     let [left, top, width, height] = POLYGON;
                     for i in 0..height / STRIP {
-                        // It touches the ground at its lower edge.
+                        // The polygon touches the ground at the lower edge of the drawing.
                         let gap = SLANT
                             * (1.0 - (f64::from(i) + 0.5) * f64::from(STRIP) / f64::from(height));
                         rectangle([left, top + i * STRIP, width, STRIP], gap)?;

@@ -1,4 +1,4 @@
-//! A figure and its files.
+//! A figure and the files that belong to it.
 
 use crate::table::{Table, rounded};
 use anyhow::Result;
@@ -7,27 +7,28 @@ use umbrage_measure::{FigureFile, FigureShown};
 /// One figure with its files.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// How its files' names begin: small letters, digits and hyphens.
+    /// Prefix of its files' names, in lower-case letters, digits and hyphens.
     pub(crate) name: &'static str,
-    /// What it shows.
+    /// Title, which says what the figure shows.
     pub(crate) title: String,
-    /// Which figure of which paper.
+    /// The paper and the figure or equations that it reproduces.
     pub(crate) source: &'static str,
-    /// What to see in it, a paragraph.
+    /// A paragraph that explains the figure.
     pub(crate) text: String,
-    /// Pictures and tables, in the page's order.
+    /// Drawings and tables, in the page's order.
     pub(crate) files: Vec<File>,
 }
 
-/// A file of a figure: `NAME.svg`, or `NAME-PART.svg` where the part has a name.
+/// One file of a figure. It is called `NAME.svg`, or `NAME-PART.svg` if `part` is not empty; tables
+/// end in `.csv`.
 #[derive(Clone, Debug)]
 pub(crate) struct File {
     part: &'static str,
     extension: &'static str,
-    /// What it shows, for those who cannot see it; for tables, what their rows are.
+    /// Alternative text for a drawing. For a table, it says what a row stands for.
     about: String,
     pub(crate) bytes: Vec<u8>,
-    /// Whether the page shows what is in a table.
+    /// Whether the page shows the rows of this table.
     is_table_shown: bool,
 }
 
@@ -49,19 +50,19 @@ impl Figure {
 }
 
 impl File {
-    /// A drawing.
+    /// Creates the file of a drawing.
     pub(crate) fn svg(part: &'static str, about: impl Into<String>, svg: String) -> Self {
         let bytes = svg.into_bytes();
         Self { part, extension: "svg", about: about.into(), bytes, is_table_shown: false }
     }
 
-    /// A table.
+    /// Creates the file of a table.
     pub(crate) fn csv(part: &'static str, about: impl Into<String>, table: Table) -> Result<Self> {
         let bytes = table.finish()?;
         Ok(Self { part, extension: "csv", about: about.into(), bytes, is_table_shown: false })
     }
 
-    /// A table so small that the page shows it.
+    /// Creates the file of a table that is small enough for the page to show its rows.
     pub(crate) fn shown_csv(
         part: &'static str,
         about: impl Into<String>,
@@ -70,14 +71,14 @@ impl File {
         Ok(Self { is_table_shown: true, ..Self::csv(part, about, table)? })
     }
 
-    /// What the page shows of a table: the headings first, numbers rounded.
+    /// The rows that the page shows: the headings first, then the cells with rounded numbers.
     fn rows(&self) -> Vec<Vec<String>> {
         if !self.is_table_shown {
             return Vec::new();
         }
         let mut csv = csv::ReaderBuilder::new().has_headers(false).from_reader(&*self.bytes);
         let cell = |cell: &str| cell.parse().map_or(cell.to_owned(), rounded);
-        // It was written here, so it can be read.
+        // Reading cannot fail, because this crate wrote the table.
         csv.records().flatten().map(|row| row.iter().map(cell).collect()).collect()
     }
 

@@ -1,4 +1,5 @@
-//! Convolution shadow maps' pictures: filters and resolutions on trees, really rendered.
+//! Figures 7 and 8 of the paper on convolution shadow maps (CSM; Annen et al. 2007): rendered
+//! shadows of trees for several filters and resolutions.
 
 use crate::figure::{Figure, File};
 use crate::rendered::{Shot, sheet};
@@ -8,8 +9,8 @@ use umbrage::Light;
 use umbrage_measure::{Image, Rgb};
 use umbrage_trace::Tracer;
 
-/// Two trees in low light from the side, whose shadows lie long and thin on the grass, under some
-/// techniques.
+/// Renders two trees with each technique. Light from the side throws long, thin shadows on the
+/// grass.
 fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
     let scene = umbrage_scene::builtin("grove", Some(2))?;
     let tracer = Tracer::new(&scene)?;
@@ -23,7 +24,7 @@ fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
     techniques.iter().map(picture).collect()
 }
 
-/// CSM, Fig. 7.
+/// Makes Fig. 7 of CSM.
 pub(crate) fn fig7() -> Result<Figure> {
     let filters = [
         ("(a) bilinear comparisons", "pcf2"),
@@ -49,7 +50,7 @@ pub(crate) fn fig7() -> Result<Figure> {
     })
 }
 
-/// CSM, Fig. 8.
+/// Makes Fig. 8 of CSM.
 pub(crate) fn fig8() -> Result<Figure> {
     let mut techniques = Vec::new();
     for blur in [1, 3, 7] {

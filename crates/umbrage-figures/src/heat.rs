@@ -1,4 +1,4 @@
-//! Heat maps as SVG, in the style of [charts](crate::chart).
+//! Draws heat maps as SVG, in the same style as [charts](crate::chart).
 
 use crate::axis::Axis;
 use crate::chart::{Area, TITLE_HEIGHT, axes, draw, text, viridis};
@@ -7,26 +7,26 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use rayon::prelude::*;
 
-/// Width of the colour bar's column, pixels.
+/// Width of the column for the colour bar, pixels.
 const COLOR_BAR_WIDTH: u32 = 110;
 
-/// One field of a picture of heat maps.
+/// One heat map in a drawing of several.
 #[derive(Clone, Debug)]
 pub(crate) struct Panel {
-    /// What is shown.
+    /// Text above the panel.
     pub(crate) title: String,
-    /// To the right.
+    /// Horizontal axis.
     pub(crate) x: Axis,
-    /// Upwards.
+    /// Vertical axis.
     pub(crate) y: Axis,
-    /// Cells along x.
+    /// Number of cells along x.
     pub(crate) columns: usize,
-    /// Of the cells, row by row from the lowest x and y; NaN where there is nothing.
+    /// Values of the cells, row by row from the lowest x and y. Cells with NaN stay blank.
     pub(crate) values: Vec<f64>,
 }
 
 impl Panel {
-    /// A field at the middles of `columns` × `rows` cells.
+    /// Evaluates `value` at the centres of `columns` × `rows` cells.
     pub(crate) fn new(
         title: impl Into<String>,
         [x, y]: [Axis; 2],
@@ -43,13 +43,13 @@ impl Panel {
         Ok(panel)
     }
 
-    /// The middle of the i-th cell.
+    /// The centre (x, y) of the i-th cell.
     fn middle(&self, i: usize, rows: usize) -> [f64; 2] {
         let middle = |axis: &Axis, i: usize, n: usize| axis.at((i as f64 + 0.5) / n as f64);
         [middle(&self.x, i % self.columns, self.columns), middle(&self.y, i / self.columns, rows)]
     }
 
-    /// x, y and value of every cell, row by row.
+    /// The centre (x, y) and the value of every cell, row by row.
     pub(crate) fn cells(&self) -> impl Iterator<Item = (f64, f64, f64)> {
         let rows = self.values.len() / self.columns;
         self.values.iter().enumerate().map(move |(i, &value)| {
@@ -78,23 +78,23 @@ impl Panel {
     }
 }
 
-/// Fields side by side that share a colour bar.
+/// Panels side by side that share one colour bar.
 #[derive(Clone, Debug)]
 pub(crate) struct HeatMaps {
-    /// What is shown, and of what.
+    /// Title of the whole drawing.
     pub(crate) title: String,
-    /// Row by row from the upper left.
+    /// Panels, row by row from the upper left.
     pub(crate) panels: Vec<Panel>,
-    /// Panels in a row.
+    /// Number of panels in a row.
     pub(crate) columns: usize,
-    /// Size of a panel with its axes, pixels.
+    /// Width and height of a panel with its axes, pixels.
     pub(crate) panel_size: [u32; 2],
-    /// What the colours mean; values beyond have the colour of the nearer end.
+    /// Scale of the colours. Values outside its range take the colour of the nearer end.
     pub(crate) color: Axis,
 }
 
 impl HeatMaps {
-    /// The SVG's text.
+    /// Draws the panels and the colour bar, and returns the SVG's text.
     pub(crate) fn svg(&self) -> Result<String> {
         let [width, height] = self.panel_size;
         let rows = self.panels.len().div_ceil(self.columns);

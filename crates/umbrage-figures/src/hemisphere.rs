@@ -1,4 +1,5 @@
-//! Figure 7 of Lloyd, Tuft, Yoon and Manocha 2006: every light above the viewer.
+//! Figure 7 of Lloyd, Tuft, Yoon and Manocha 2006: the storage factor for every light direction
+//! from above the horizon.
 
 use crate::axis::Axis;
 use crate::chart::{Curve, LineChart};
@@ -14,7 +15,7 @@ use std::f64::consts::FRAC_PI_2;
 use umbrage::Faces;
 use umbrage::theory::{LightFrom, View};
 
-/// Storage over all lights above the viewer.
+/// Makes Fig. 7: the storage factor over the hemisphere of light directions.
 pub(crate) fn fig7() -> Result<Figure> {
     let view = paper_view(1000.0)?;
     let schemes = [
@@ -53,7 +54,7 @@ pub(crate) fn fig7() -> Result<Figure> {
     })
 }
 
-/// All directions: a table of each, one of the worst, and their drawing.
+/// Measures all light directions. Returns a table of all, a table of the worst, and heat maps.
 fn hemisphere(view: View, schemes: &[Scheme]) -> Result<(Table, Table, String)> {
     const CELLS: usize = 61;
     let mut sky = Table::new(&["scheme", "forward_deg", "right_deg", "storage_factor_measured"])?;
@@ -91,7 +92,8 @@ fn hemisphere(view: View, schemes: &[Scheme]) -> Result<(Table, Table, String)> 
     Ok((sky, worst, maps.svg()?))
 }
 
-/// Those in the plane of the view, with closed forms: a table and a drawing.
+/// Computes closed forms and measurements for light directions in the plane x = 0, which contains
+/// the view direction and the zenith. Returns a table and a chart.
 fn section(view: View, schemes: &[Scheme]) -> Result<(Table, String)> {
     let mut section =
         Table::new(&["scheme", "forward_deg", "storage_factor", "storage_factor_measured"])?;
@@ -123,7 +125,8 @@ fn section(view: View, schemes: &[Scheme]) -> Result<(Table, String)> {
                 found.into(),
             ])?;
         }
-        // A line between the two lights that faces have formulas for would be none of theirs.
+        // Faces have formulas only for light from overhead and from behind. A line between these
+        // would not be a closed form, so none is drawn.
         let line = rows
             .iter()
             .map(|&[x, formula, _]| [x, formula])
@@ -144,10 +147,11 @@ fn section(view: View, schemes: &[Scheme]) -> Result<(Table, String)> {
     Ok((section, chart.svg()?))
 }
 
-/// The way of light that comes from so many degrees from overhead; `None` below the horizon.
+/// The light direction for a light that stands `forward_deg` to the front and `right_deg` to the
+/// right of the zenith; `None` below the horizon.
 fn from_sky(forward_deg: f64, right_deg: f64) -> Option<DVec3> {
     let from_zenith = forward_deg.hypot(right_deg);
-    // The corners of a grid that ends at the horizon round to either side of it.
+    // The tolerance keeps directions on the horizon, which rounding may put below it.
     if from_zenith > 90.0 + 1e-9 {
         return None;
     }

@@ -1,5 +1,5 @@
-//! The papers' figures and tables once more, from the closed forms, and from maps that were really
-//! planned and rendered, as SVG and CSV with a page that shows them.
+//! Reproduces the papers' figures and tables from the closed forms and from shadow maps that are
+//! planned and rendered. The output is SVG drawings, CSV tables and a page that shows them.
 //!
 //! ```
 //! let figures = umbrage_figures::make(&["wp-storage".to_owned()], &())?;
@@ -36,7 +36,7 @@ use std::path::Path;
 use umbrage_lab::{Contents, Progress};
 use umbrage_measure::{FiguresPage, write_figures};
 
-/// How a figure is made.
+/// A function that makes one figure.
 type Make = fn() -> Result<Figure>;
 
 /// All figures, in the page's order.
@@ -60,7 +60,7 @@ const FIGURES: &[(&str, Make)] = &[
     ("misprints", misprints::misprints),
 ];
 
-/// What a folder of figures holds.
+/// Which files a folder of figures may contain, and how an existing folder is recognised.
 pub const CONTENTS: Contents = Contents {
     name: "figures of umbrage",
     is_former: |names| {
@@ -70,23 +70,23 @@ pub const CONTENTS: Contents = Contents {
     may_have: |name| ["index.html", "figures.json"].contains(&name) || may_have_made(name),
 };
 
-/// Whether a file of this name may belong to a figure.
+/// Whether a file with this name may belong to a figure.
 fn may_have_made(file: &str) -> bool {
     let Some((stem, extension)) = file.rsplit_once('.') else { return false };
     let mut rest = names().filter_map(|name| stem.strip_prefix(name));
     ["svg", "csv"].contains(&extension) && rest.any(|r| r.is_empty() || r.starts_with('-'))
 }
 
-/// The names of all figures, in the page's order: small letters, digits and hyphens.
+/// The names of all figures, in the page's order, in lower-case letters, digits and hyphens.
 pub fn names() -> impl Iterator<Item = &'static str> {
     FIGURES.iter().map(|(name, _)| *name)
 }
 
-/// Makes the figures of these names, or all if there are none, in the page's order. Each is a part
-/// of the job.
+/// Makes the figures with these names, or all figures if `only` is empty, in the page's order. Each
+/// figure counts as one part of the job in `progress`.
 ///
 /// # Errors
-/// What the planner, a closed form or a drawing refuses, which would be a mistake in here.
+/// Returns errors of the planner, a closed form or a drawing. Any of these is a bug in this crate.
 pub fn make(only: &[String], progress: &dyn Progress) -> Result<Vec<Figure>> {
     let is_wanted = |name: &str| only.is_empty() || only.iter().any(|o| o == name);
     let wanted: Vec<_> = FIGURES.iter().filter(|(name, _)| is_wanted(name)).collect();
@@ -100,11 +100,11 @@ pub fn make(only: &[String], progress: &dyn Progress) -> Result<Vec<Figure>> {
     figures.collect()
 }
 
-/// Writes figures and their page into an empty `folder`. `command` is what makes them again, for
-/// people to copy.
+/// Writes figures and their page into an empty `folder`. The page shows `command` as the command
+/// line that makes the figures again.
 ///
 /// # Errors
-/// Files that cannot be written.
+/// Fails if a file cannot be written.
 pub fn write(figures: &[Figure], folder: &Path, command: &str) -> Result<()> {
     for figure in figures {
         for file in &figure.files {

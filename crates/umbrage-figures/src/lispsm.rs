@@ -1,4 +1,4 @@
-//! The figure of Wimmer, Scherzer and Purgathofer 2004.
+//! Figure 6 of Wimmer, Scherzer and Purgathofer 2004.
 
 use crate::axis::Axis;
 use crate::chart::{Curve, LineChart};
@@ -10,9 +10,9 @@ use std::f64::consts::FRAC_PI_2;
 use umbrage::theory::{Overhead, Rule, Tilted, View};
 use umbrage::{Faces, Warp};
 
-/// The errors of four parameterizations along the view, light overhead.
+/// Makes Fig. 6: the errors of four parameterizations over the distance z, with the light overhead.
 pub(crate) fn fig6() -> Result<Figure> {
-    // With this φ, 2 tan φ = 1, which LiSPSM leaves out.
+    // The paper leaves out the factor 2 tan φ, which is 1 for this φ.
     let view = View::new(1.0, 100.0, 0.5_f64.atan())?;
     let techniques = [
         ("Uniform", Rule::Uniform, Warp::Uniform),

@@ -1,4 +1,5 @@
-//! What the planner really makes of a view, to be held against the closed forms.
+//! Plans views with the library's planner, so that figures can compare its errors with the closed
+//! forms.
 
 use anyhow::Result;
 use glam::DVec3;
@@ -8,13 +9,13 @@ use umbrage::{
     Bounds, Camera, Faces, Light, LookAt, Partition, Plan, Planner, Size, Technique, Warp,
 };
 
-/// A square view along −z with y up, of one pixel, so that the error of a map of one texel is that
-/// of resolutions left out.
+/// A camera with a square image of one pixel that looks along −z with y up. With a map of one texel
+/// its errors equal those of formulas that leave out the resolutions.
 pub(crate) fn camera(view: View) -> Result<Camera> {
     camera_of(view, 1)
 }
 
-/// The same of so many pixels each way.
+/// The same camera with an image of `side` × `side` pixels.
 pub(crate) fn camera_of(view: View, side: u32) -> Result<Camera> {
     Ok(Camera::look_at(LookAt {
         eye: DVec3::ZERO,
@@ -27,16 +28,17 @@ pub(crate) fn camera_of(view: View, side: u32) -> Result<Camera> {
     })?)
 }
 
-/// The way of light that comes from above, behind the viewer, at an angle θ to the view.
+/// The direction of light that comes from above and behind the viewer, at an angle θ to the view
+/// direction.
 pub(crate) fn from_behind(theta_rad: f64) -> DVec3 {
-    // The sine and cosine of 90° in floating point are not.
+    // In floating point, the cosine of 90° is not exactly 0.
     let (sin, cos) =
         if theta_rad == std::f64::consts::FRAC_PI_2 { (1.0, 0.0) } else { theta_rad.sin_cos() };
     DVec3::new(0.0, -sin, -cos)
 }
 
-/// Maps of one texel for all of a view, in parallel light of this direction, cut into self-similar
-/// slices.
+/// Plans maps of one texel for a whole view in parallel light of this direction. The view is cut
+/// into self-similar slices and, if `faces` asks for it, into faces.
 pub(crate) fn plan(
     view: View,
     direction: DVec3,
@@ -54,8 +56,8 @@ pub(crate) fn plan(
     Ok(Planner::new().plan(&camera(view)?, &[light], &Bounds::default(), &technique)?.clone())
 }
 
-/// Perspective errors of a plan's first map in the middle of the view at a distance, pixels per
-/// texel.
+/// The perspective error of a plan's first map in the centre of the view at distance `z`, pixels
+/// per texel.
 pub(crate) fn error_at(plan: &Plan, view: View, z: f64) -> Result<PointError> {
     plan.maps[0]
         .perspective_error(&camera(view)?, DVec3::NEG_Z * z)

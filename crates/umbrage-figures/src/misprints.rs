@@ -1,4 +1,4 @@
-//! Formulas that the papers print wrong: as printed, put right, and measured.
+//! Compares formulas that the papers misprint: the value as printed, corrected, and measured.
 
 use crate::figure::{Figure, File};
 use crate::planned::Planned;
@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 use umbrage::Warp;
 use umbrage::theory::{FourierStep, Overhead, Tilted, View};
 
-/// One formula.
+/// One misprinted formula with its values in one example.
 struct Misprint {
     place: &'static str,
     quantity: &'static str,
@@ -21,7 +21,7 @@ struct Misprint {
     measured: f64,
 }
 
-/// All of them.
+/// Makes the figure and the table of all misprints.
 pub(crate) fn misprints() -> Result<Figure> {
     let found = found()?;
     let mut table = Table::new(&["place", "quantity", "value_printed", "value", "value_measured"])?;
@@ -81,7 +81,7 @@ fn found() -> Result<Vec<Misprint>> {
     };
 
     let warped = Tilted::new(view, FRAC_PI_2)?.warped(lambda)?;
-    // Its depth is known to a thousandth here, and the error is flat around it.
+    // The samples give the depth of the minimum to a thousandth, and the error is flat around it.
     let depths = (0..=4000).map(|i| n * (f / n).powf(f64::from(i) / 4000.0));
     let least = Misprint {
         place: "Zhang et al. 2009, §3.1",
@@ -134,8 +134,8 @@ fn found() -> Result<Vec<Misprint>> {
     Ok(all)
 }
 
-/// The series of the step that is 1 for d ≤ z, each coefficient a numerical integral over the
-/// step's period in z − d.
+/// Evaluates the Fourier series of the step that is 1 for d ≤ z. Each coefficient is a numerical
+/// integral over the step's period in z − d.
 fn integrated(order: u32, d: f64, z: f64) -> f64 {
     const STEPS: u32 = 100_000;
     let width = 2.0 / f64::from(STEPS);
@@ -150,12 +150,12 @@ fn integrated(order: u32, d: f64, z: f64) -> f64 {
     mean + waves.sum::<f64>()
 }
 
-/// The table, and beside it each value over the measured one.
+/// Draws the table, and beside it a chart of each value's ratio to the measured value.
 fn drawn(found: &[Misprint]) -> Result<String> {
     const ROW: i32 = 30;
     const HEAD: i32 = 34;
     const COLUMNS: [i32; 5] = [12, 210, 500, 590, 680];
-    /// Where the ratios' axis begins and ends, pixels, and the powers of ten there.
+    /// The ends of the axis of ratios, first in pixels and then as exponents of 10.
     const PLOT: [i32; 2] = [710, 960];
     const POWERS: [f64; 2] = [-2.0, 1.0];
     const PRINTED: RGBColor = chart::COLORS[1];

@@ -1,5 +1,5 @@
-//! What the papers left open: the worst errors of every warp at any angle of light, and what
-//! choosing the warp by them gains.
+//! Figures that the papers do not have: the largest errors of every warp at every light angle, and
+//! the texels that the adaptive warp saves.
 
 use crate::axis::Axis;
 use crate::chart::{Curve, LineChart};
@@ -16,7 +16,7 @@ use umbrage::theory::{Rule, Tilted, View};
 const STORAGE: Rule = Rule::Adaptive(Objective::Storage);
 const LISPSM: Rule = Rule::LispsmInRange;
 
-/// Every warp of one parameter, in the order of their curves.
+/// Every warp that one parameter λ describes, in the order of the curves.
 const RULES: [(&str, Rule); 7] = [
     ("uniform", Rule::Uniform),
     ("PSM", Rule::Psm),
@@ -27,16 +27,17 @@ const RULES: [(&str, Rule); 7] = [
     ("adaptive (area)", Rule::Adaptive(Objective::Area)),
 ];
 
-/// One warp under one light: what the closed form says and what was planned.
+/// The results of one warp in one view under one light. Each pair holds the closed form's value and
+/// the planned map's.
 struct Worst {
     rule: usize,
     x: f64,
     lambda: [f64; 2],
-    /// M_q·M_p.
+    /// M_q·M_p, the product of the largest errors.
     storage: [f64; 2],
-    /// The largest E_q·E_p.
+    /// The largest E_q·E_p at any one point.
     product: [f64; 2],
-    /// M_q and M_p.
+    /// M_q and M_p, the largest E_q and the largest E_p.
     largest: [[f64; 2]; 2],
 }
 
@@ -58,7 +59,8 @@ impl Worst {
     }
 }
 
-/// A curve a warp: closed form as a line, every `every`-th measured one a marker.
+/// One curve for each warp: a line for the closed form, and markers at every `every`-th measured
+/// value.
 fn curves(found: &[Worst], value: fn(&Worst) -> [f64; 2], every: usize) -> Vec<Curve> {
     let of_rule = |i: usize| found.iter().filter(move |w| w.rule == i);
     (0..RULES.len())
@@ -66,14 +68,14 @@ fn curves(found: &[Worst], value: fn(&Worst) -> [f64; 2], every: usize) -> Vec<C
         .map(|i| {
             Curve::new(RULES[i].0)
                 .line(of_rule(i).map(|w| [w.x, value(w)[0]]))
-                // Warps that agree would hide each other's markers.
+                // The offset keeps the markers of warps with equal values from hiding each other.
                 .markers(of_rule(i).skip(i % every).step_by(every).map(|w| [w.x, value(w)[1]]))
                 .color(i)
         })
         .collect()
 }
 
-/// Worst errors over θ.
+/// Makes the figure of the largest errors over the light angle θ.
 pub(crate) fn theta() -> Result<Figure> {
     let view = View::new(1.0, 100.0, FRAC_PI_6)?;
     let found: Vec<Worst> = (0..RULES.len())
@@ -145,7 +147,7 @@ pub(crate) fn theta() -> Result<Figure> {
     })
 }
 
-/// Critical resolution over f/n.
+/// Makes the figure of the critical resolution over the depth ratio f/n.
 pub(crate) fn critical() -> Result<Figure> {
     const SHOWN: [usize; 4] = [0, 1, 3, 5];
     let ratio = Axis::log("depth ratio f/n", [2.0, 1e4]);
@@ -171,7 +173,7 @@ pub(crate) fn critical() -> Result<Figure> {
             })
             .collect::<Result<_>>()?;
         for w in &found {
-            // Half of E is the error of one pixel over one texel.
+            // E/2 is the error for an image of one pixel and a map of one texel.
             let [closed, measured] = w.largest.map(|m| m.map(|e| e / 2.0));
             table.row(&[
                 Cell::from(degrees),
@@ -225,7 +227,7 @@ pub(crate) fn critical() -> Result<Figure> {
     })
 }
 
-/// What `adaptive` gains over LiSPSM.
+/// Makes the figure of the adaptive warp's gain over LiSPSM.
 pub(crate) fn gain() -> Result<Figure> {
     let phi = FRAC_PI_6;
     let angle = Axis::linear("angle θ between view and light, degrees", [30.0, 90.0]);

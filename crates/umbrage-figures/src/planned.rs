@@ -1,5 +1,5 @@
-//! Planned maps in the units and axes of Theory: errors E, and light in the plane of the view's y
-//! axis and direction.
+//! Plans shadow maps and states their errors E in the units and axes of Theory (Zhang et al. 2009).
+//! The light direction lies in the plane of the view's y axis and direction.
 
 use crate::measured;
 use anyhow::{Result, ensure};
@@ -8,13 +8,13 @@ use std::f64::consts::PI;
 use umbrage::theory::{Errors, Rule, View};
 use umbrage::{Camera, Faces, Plan, ShadowMap, Warp};
 
-/// The way of light that comes from above and, for θ < 90°, from before the viewer. V's lower side
-/// is where errors are large then.
+/// The direction of light that comes from above and, for θ < 90°, from in front of the viewer. In
+/// this case errors are large at the lower side of V.
 pub(crate) fn from_before(theta_rad: f64) -> DVec3 {
     measured::from_behind(PI - theta_rad)
 }
 
-/// The planner's warp for a rule. What it has no name for it is told by λ.
+/// The planner's warp for a rule. Rules that the planner has no warp for become [`Warp::Lambda`].
 pub(crate) fn warp(rule: Rule, lambda: f64) -> Warp {
     match rule {
         Rule::Uniform => Warp::Uniform,
@@ -27,7 +27,7 @@ pub(crate) fn warp(rule: Rule, lambda: f64) -> Warp {
     }
 }
 
-/// A planned map of one view in one light.
+/// The plan with one map for one view and one light.
 pub(crate) struct Planned {
     camera: Camera,
     plan: Plan,
@@ -44,26 +44,26 @@ impl Planned {
         &self.plan.maps[0]
     }
 
-    /// λ, metres; infinite for no warp.
+    /// λ, metres; infinite if the map has no warp.
     pub(crate) fn lambda(&self) -> f64 {
         self.map().lambda.unwrap_or(f64::INFINITY)
     }
 
-    /// E_q and E_p at (y, z) in the plane x = 0, from the Jacobian of the map's matrix; NaN where
-    /// the map does not apply.
+    /// The errors E_q and E_p at (y, z) in the plane x = 0, from the Jacobian of the map's matrix.
+    /// They are NaN where the map does not apply.
     pub(crate) fn errors(&self, y: f64, z: f64) -> Errors {
         let m = self.map().perspective_error(&self.camera, DVec3::new(0.0, y, -z));
-        // For an image of one pixel and a map of one texel E is twice m.
+        // For an image of one pixel and a map of one texel, E is twice the error m.
         m.map_or(Errors { q: f64::NAN, p: f64::NAN }, |m| Errors { q: 2.0 * m.s, p: 2.0 * m.t })
     }
 
-    /// M_q and M_p, the largest errors over V, as the plan states them.
+    /// The largest errors over V, M_q and M_p, as the plan states them.
     pub(crate) fn largest(&self) -> Errors {
         let error = self.map().error;
         Errors { q: 2.0 * error.max_s, p: 2.0 * error.max_t }
     }
 
-    /// The largest E_q·E_p at any one point of V: at one of its corners, by Theory §3.1.
+    /// The largest E_q·E_p at any one point of V, which lies at a corner of V (Theory §3.1).
     pub(crate) fn largest_product(&self, view: View) -> f64 {
         let corners =
             [view.near(), view.far()].into_iter().flat_map(|z| [-z, z].map(|side| (side, z)));

@@ -1,4 +1,4 @@
-//! Pictures of shadows that were really rendered, side by side.
+//! Renders pictures of shadows and places them side by side in one drawing.
 
 use crate::chart;
 use anyhow::Result;
@@ -11,12 +11,12 @@ use umbrage_measure::{Image, PngPixel, Rgb, png};
 use umbrage_scene::Scene;
 use umbrage_trace::{Reference, Tracer, View};
 
-/// Width and height of a picture, pixels.
+/// Width and height of one picture, pixels.
 const TILE: [u32; 2] = [270, 180];
 const GAP: u32 = 8;
 const LABEL: u32 = 22;
 
-/// A built-in scene with a view into it.
+/// A scene's bounds and tracer, with a camera and a light.
 pub(crate) struct Shot<'a> {
     tracer: &'a Tracer<'a>,
     bounds: Bounds<'a>,
@@ -25,7 +25,7 @@ pub(crate) struct Shot<'a> {
 }
 
 impl<'a> Shot<'a> {
-    /// `change` makes it from the scene's own view.
+    /// Takes the scene's default view and lets `change` modify it.
     pub(crate) fn new(
         scene: &Scene,
         tracer: &'a Tracer<'a>,
@@ -38,12 +38,12 @@ impl<'a> Shot<'a> {
         Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })
     }
 
-    /// What a technique, as on the command line, makes of it.
+    /// Renders the picture with a technique that is written as on the command line.
     pub(crate) fn picture(&self, technique: &str) -> Result<Image<Rgb>> {
         let technique: NamedTechnique = technique.parse()?;
         let (plan, _) = umbrage_lab::plan(&technique, &self.camera, &self.light, &self.bounds)?;
         let reference = Reference::render(self.tracer, &plan, &|_| {})?;
-        // Pixels at their centres, as renderers shade.
+        // One sample at the centre of each pixel, as renderers shade.
         let view = View::new(self.tracer, self.camera, self.light, 1)?;
         let mut picture = Shadowed::default();
         for rows in view.bands() {
@@ -53,7 +53,7 @@ impl<'a> Shot<'a> {
     }
 }
 
-/// Pictures in rows of `columns`, each with what it is written below, as one drawing.
+/// Arranges pictures in rows of `columns`, each with its label below, in one SVG drawing.
 pub(crate) fn sheet(
     title: &str,
     columns: usize,
@@ -81,7 +81,7 @@ pub(crate) fn sheet(
     Ok(svg)
 }
 
-/// A picture as part of the SVG, its upper left corner at `at`.
+/// An SVG element that holds a picture as PNG, with its upper left corner at (x, y) and size w × h.
 pub(crate) fn embedded<P: PngPixel>(
     [x, y]: [i32; 2],
     [w, h]: [i32; 2],

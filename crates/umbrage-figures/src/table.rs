@@ -1,4 +1,4 @@
-//! Tables as CSV.
+//! Writes tables as CSV.
 
 use anyhow::Result;
 
@@ -12,11 +12,11 @@ impl Table {
         Ok(Self(csv))
     }
 
-    /// A row, in the headings' order.
+    /// Adds a row of cells, in the order of the headings.
     pub(crate) fn row(&mut self, cells: &[Cell<'_>]) -> Result<()> {
         let cells = cells.iter().map(|cell| match cell {
             Cell::Word(word) => (*word).to_owned(),
-            // The shortest text that reads back as the same number.
+            // `to_string` gives the shortest text that parses to the same number.
             Cell::Number(n) if n.is_finite() => n.to_string(),
             Cell::Number(_) => String::new(),
         });
@@ -28,7 +28,7 @@ impl Table {
     }
 }
 
-/// A cell of a table; numbers that are not finite are left out.
+/// A cell of a table. A number that is not finite gives an empty cell.
 pub(crate) enum Cell<'a> {
     Word(&'a str),
     Number(f64),
@@ -52,7 +52,7 @@ impl<'a> From<&'a str> for Cell<'a> {
     }
 }
 
-/// Five digits of a number.
+/// Formats a number with five significant digits.
 pub(crate) fn rounded(n: f64) -> String {
     if n == 0.0 || !n.is_finite() {
         return n.to_string();

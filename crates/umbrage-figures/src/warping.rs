@@ -1,4 +1,4 @@
-//! The figures of Lloyd, Tuft, Yoon and Manocha 2006.
+//! Figures 5, 6, 10, 12 and 13 of Lloyd, Tuft, Yoon and Manocha 2006, and a table of storage.
 
 use crate::axis::Axis;
 use crate::chart::{Curve, LineChart};
@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_PI_2;
 use umbrage::theory::{LightFrom, Overhead, View};
 use umbrage::{Faces, Partition, Warp};
 
-/// A λ in a legend.
+/// The name of a λ in a legend.
 fn lambda_name(view: View, lambda: f64) -> String {
     if lambda == f64::INFINITY {
         "∞ (no warp)".to_owned()
@@ -24,7 +24,7 @@ fn lambda_name(view: View, lambda: f64) -> String {
     }
 }
 
-/// Errors along the view for several λ, light overhead.
+/// Makes Fig. 5: errors over the distance z for several λ, with the light overhead.
 pub(crate) fn fig5() -> Result<Figure> {
     let view = paper_view(20.0)?;
     let lambdas = [f64::INFINITY, 20.0, view.lambda_l(), 2.0, view.near()];
@@ -83,7 +83,7 @@ pub(crate) fn fig5() -> Result<Figure> {
     })
 }
 
-/// Largest errors and storage over η.
+/// Makes Fig. 6: the largest errors and the storage factor over η, with the light overhead.
 pub(crate) fn fig6() -> Result<Figure> {
     let view = paper_view(100.0)?;
     let mut table = Table::new(&[
@@ -140,7 +140,7 @@ pub(crate) fn fig6() -> Result<Figure> {
     })
 }
 
-/// Storage over the number of slices, light overhead.
+/// Makes Fig. 10: the storage factor over the number of slices, with the light overhead.
 pub(crate) fn fig10() -> Result<Figure> {
     let view = paper_view(1000.0)?;
     let mut table = Table::new(&["scheme", "maps", "storage_factor", "storage_factor_measured"])?;
@@ -150,7 +150,7 @@ pub(crate) fn fig10() -> Result<Figure> {
         let scheme = |k| Scheme::new(name, k, is_warped, false);
         curves.push(over_maps(&mut table, view, LightFrom::Overhead, 1..=16, scheme)?);
     }
-    // Slices change nothing where the error is already even.
+    // The logarithmic map's error is the same everywhere, so slices would change nothing.
     let best = view.log_error();
     let log = plan(view, from_behind(FRAC_PI_2), Warp::Log, 1, Faces::Whole)?.storage_factor();
     table.row(&[Cell::from("logarithmic"), 1_u32.into(), best.into(), log.into()])?;
@@ -184,7 +184,8 @@ pub(crate) fn fig10() -> Result<Figure> {
     })
 }
 
-/// A scheme's storage over its slices, as a curve and as rows of a table.
+/// Computes a scheme's storage factor over its number of maps. Returns it as a curve, and adds rows
+/// to `table`.
 fn over_maps(
     table: &mut Table,
     view: View,
@@ -205,7 +206,7 @@ fn over_maps(
     Ok(Curve::new(name).line(line).markers(markers))
 }
 
-/// Storage over the number of maps, light overhead and behind.
+/// Makes Fig. 12: the storage factor over the number of maps, with the light overhead and behind.
 pub(crate) fn fig12() -> Result<Figure> {
     let view = paper_view(1000.0)?;
     let chart = |light, what: &str| -> Result<_> {
@@ -253,7 +254,7 @@ pub(crate) fn fig12() -> Result<Figure> {
     })
 }
 
-/// Which scheme needs less with the light behind.
+/// Makes Fig. 13: whether slices or faces need fewer texels, with the light behind the viewer.
 pub(crate) fn fig13() -> Result<Figure> {
     let maps = 5..=Partition::MAX_SLICES as u32;
     let mut table =
@@ -271,7 +272,7 @@ pub(crate) fn fig13() -> Result<Figure> {
         table.row(&[Cell::from(maps), slices.into(), formula.into(), found.into()])?;
         ties.push((f64::from(maps), formula, found));
     }
-    // The number of face slices changes between whole numbers of maps.
+    // The curve has steps, because the number of face slices changes between whole numbers of maps.
     let line =
         ties.iter().flat_map(|&(maps, formula, _)| [[maps - 0.5, formula], [maps + 0.5, formula]]);
     let tie = Curve::new("as many texels")
@@ -303,7 +304,7 @@ pub(crate) fn fig13() -> Result<Figure> {
     })
 }
 
-/// The f/n at which a ratio that falls with it is 1.
+/// Finds the f/n at which `ratio`, which falls as f/n grows, is 1.
 fn tie(ratio: impl Fn(View) -> Result<f64>) -> Result<f64> {
     let [mut low, mut high] = [1.01_f64, 1e6].map(f64::ln);
     for _ in 0..45 {
@@ -313,7 +314,7 @@ fn tie(ratio: impl Fn(View) -> Result<f64>) -> Result<f64> {
     Ok(low.exp())
 }
 
-/// Storage of partitions, as a table.
+/// Makes a table of the storage factors of partitions.
 pub(crate) fn storage() -> Result<Figure> {
     let view = paper_view(1000.0)?;
     let mut table = Table::new(&[

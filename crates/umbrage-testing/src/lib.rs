@@ -1,17 +1,17 @@
-//! Ignores tests, with the reason, where what they need is missing: third-party scenes, a GPU, a
-//! browser. It is decided when the tests are built, as `#[ignore]` can be at no other time.
+//! Ignores tests, and states the reason, where third-party scenes, a GPU or a browser that they
+//! need is missing. This is decided when tests are built, because `#[ignore]` acts at compile time.
 
 use proc_macro::{Delimiter, Literal, TokenStream, TokenTree};
 
-/// For each need: its name, and why it is missing, if it is.
+/// The name of each need, and the reason why it is missing; the reason is empty if it is present.
 const NEEDS: [(&str, &str); 3] = [
     ("scenes", env!("MISSING_SCENES")),
     ("gpu", env!("MISSING_GPU")),
     ("browser", env!("MISSING_BROWSER")),
 ];
 
-/// `#[needs(scenes)]`, `#[needs(gpu)]`, `#[needs(browser)]` or several: a test that is ignored
-/// where one of these is missing. Stands above `#[test]`.
+/// Ignores a test where one of its needs is missing: `#[needs(scenes)]`, `#[needs(gpu)]`,
+/// `#[needs(browser)]`, or several names with commas. The attribute must stand above `#[test]`.
 #[proc_macro_attribute]
 pub fn needs(names: TokenStream, test: TokenStream) -> TokenStream {
     if !is_test(&test) {
@@ -34,13 +34,13 @@ pub fn needs(names: TokenStream, test: TokenStream) -> TokenStream {
     ignored
 }
 
-/// The folder of third-party scenes, a string literal.
+/// Expands to the folder of third-party scenes, as a string literal.
 #[proc_macro]
 pub fn third_party_scenes(_: TokenStream) -> TokenStream {
     TokenTree::from(Literal::string(env!("THIRD_PARTY_SCENES"))).into()
 }
 
-/// Whether `#[test]` is still among an item's attributes.
+/// Whether the item still has the attribute `#[test]`, which is so if `#[needs]` stands above it.
 fn is_test(item: &TokenStream) -> bool {
     item.clone().into_iter().any(|token| {
         matches!(token, TokenTree::Group(g)

@@ -1,5 +1,6 @@
-//! Says what tests are going to be ignored for, and has it looked for anew where that has changed
-//! since they were built. With `UMBRAGE_REQUIRE=all` nothing may be missing.
+//! Prints the reasons why tests will be ignored. If these have changed since the last build,
+//! touches `build.rs`, so that Cargo runs it again. With `UMBRAGE_REQUIRE=all`, fails if there are
+//! any reasons.
 
 mod needs;
 

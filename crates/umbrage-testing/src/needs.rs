@@ -1,18 +1,19 @@
-//! What some tests need and a machine may lack.
+//! Looks for what some tests need and a machine may lack: third-party scenes, a GPU and a browser.
 
 use std::path::{Path, PathBuf};
 
-/// Third-party scenes, a GPU and a browser: why what needs them is ignored, or nothing.
+/// For third-party scenes, a GPU and a browser, in this order: the reason why tests that need it
+/// are ignored. The reason is empty if the need is met.
 pub(crate) fn missing() -> [String; 3] {
     [missing_scenes(), missing_gpu(), missing_browser()].map(Option::unwrap_or_default)
 }
 
-/// The folder of third-party scenes, be it there or not.
+/// The folder of third-party scenes, whether or not it exists.
 pub(crate) fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(named_scenes())
 }
 
-/// As named, from the workspace's root.
+/// The folder of third-party scenes, relative to the workspace's root.
 fn named_scenes() -> String {
     set("UMBRAGE_SCENES").unwrap_or("../shared/scenes".into())
 }
@@ -24,7 +25,7 @@ fn missing_scenes() -> Option<String> {
     })
 }
 
-/// Only Linux can be without any driver for a GPU; there the loader finds drivers by these files.
+/// Only Linux can lack every GPU driver. There the Vulkan loader finds drivers by these JSON files.
 fn missing_gpu() -> Option<String> {
     let folders = ["/etc/vulkan/icd.d", "/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"];
     let is_driver = |path: &Path| path.extension().is_some_and(|e| e == "json");
