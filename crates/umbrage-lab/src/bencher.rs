@@ -1,4 +1,4 @@
-//! What a frame costs.
+//! The costs of a frame.
 
 use crate::error::{About, Error, Field};
 use crate::executor::{Executor, OnGpu, RenderScene, Work};
@@ -10,33 +10,33 @@ use umbrage_render::{Drawn, FrameTarget, Shading, Timer};
 use umbrage_trace::{Reference, Tracer, View};
 use umbrage_wgpu::Casters;
 
-/// What a frame cost, times in milliseconds.
+/// The costs of a frame, with times in milliseconds.
 #[derive(Clone, Debug)]
 pub struct Costs {
-    /// Memory of what lookup reads.
+    /// Memory that lookup reads, bytes.
     pub bytes: u64,
-    /// Drawing the maps.
+    /// Time to draw the maps.
     pub depth: f64,
-    /// Filtering them, where it is told apart from `depth`, and there is any.
+    /// Time to prefilter the maps; `None` without a prefilter, or if `depth` includes this time.
     pub filter: Option<f64>,
-    /// Drawing the picture.
+    /// Time to draw the picture.
     pub shade: f64,
-    /// Into which map, by its index in the plan, what was drawn, where that is told.
+    /// What was drawn into which map, by the map's index in the plan; `None` for the CPU reference.
     pub drawn: Option<Vec<(usize, Drawn)>>,
 }
 
-/// Draws frame after frame of one technique for a stop-watch.
+/// Draws frames of one technique and measures what they cost.
 pub struct Bencher<'a> {
     executor: Executor<'a>,
-    /// What a GPU draws into, and its watch if it has one.
+    /// Target that the GPU draws into, and a timer if the GPU has timestamps.
     target: Option<(FrameTarget, Option<Timer>)>,
 }
 
 impl<'a> Bencher<'a> {
-    /// Who draws frames of so many pixels.
+    /// Makes a bencher that draws frames of this width and height, pixels.
     ///
     /// # Errors
-    /// What a GPU refuses.
+    /// An error if the GPU fails, or if it does not support the technique or the size.
     pub fn new(
         scene: &'a RenderScene<'_>,
         technique: &Technique,
@@ -52,21 +52,21 @@ impl<'a> Bencher<'a> {
         Ok(Self { executor, target })
     }
 
-    /// Who draws.
+    /// Returns the executor that draws.
     pub fn executor(&self) -> &Executor<'_> {
         &self.executor
     }
 
-    /// Whether the GPU tells how long its passes take.
+    /// Returns whether the GPU measures how long its passes take.
     pub fn has_timestamps(&self) -> bool {
         matches!(self.target, Some((_, Some(_))))
     }
 
-    /// Draws a frame, and waits until it is done. `still`: maps that are as they were are not drawn
-    /// again.
+    /// Draws a frame, and waits until it is done. If `still` is true, casters are unmoved, so a GPU
+    /// does not draw maps again that have not changed.
     ///
     /// # Errors
-    /// What a GPU refuses, or maps that do not fit into memory.
+    /// An error if a GPU fails, or if the maps do not fit into memory.
     pub fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs, Error> {
         match (&mut self.executor.work, &self.target) {
             (Work::Gpu(on), Some((target, timer))) => {

@@ -1,19 +1,19 @@
-//! What need not be drawn into a map.
+//! Culling of casters: which triangles need not be drawn into a shadow map.
 
 use serde::Serialize;
 use umbrage::{Aabb, Plan, ShadowMap};
 use umbrage_scene::Scene;
 
-/// Triangles of instances whose boxes may cast into a map, and of the others.
+/// Numbers of triangles for one shadow map, by whether the box of their instance may cast into it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MapCasters {
-    /// Those that may cast.
+    /// Triangles of instances that may cast into the map.
     pub drawn: u64,
-    /// Those that cannot.
+    /// Triangles of instances that cannot.
     pub culled: u64,
 }
 
-/// For each of a plan's maps, what may cast into it.
+/// Counts the triangles that may cast into each of the plan's maps, and those that cannot.
 pub fn casters(plan: &Plan, scene: &Scene) -> Vec<MapCasters> {
     let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
     let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
@@ -26,8 +26,8 @@ pub fn casters(plan: &Plan, scene: &Scene) -> Vec<MapCasters> {
     plan.maps.iter().map(of_map).collect()
 }
 
-/// Share of all triangles that are culled, 0 to 1, the mean over maps that are not empty; `None` if
-/// all are. `casters` has an entry for each map.
+/// Fraction of all triangles that are culled, 0 to 1, the mean over the maps that are not empty;
+/// `None` if all maps are empty. `casters` has an entry for each map.
 pub fn casters_culled(plan: &Plan, casters: &[MapCasters]) -> Option<f64> {
     let casters = plan.maps.iter().zip(casters);
     let of_full = casters.filter(|(map, _)| !map.is_empty()).map(|(_, casters)| casters);

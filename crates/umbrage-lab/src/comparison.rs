@@ -1,4 +1,4 @@
-//! One view's comparison: techniques against ray-traced truth, as pictures, figures and a page in a
+//! Comparison of techniques with ray-traced truth in one view, as pictures, figures and a page in a
 //! folder.
 
 use crate::casters::{casters, casters_culled};
@@ -25,27 +25,27 @@ use umbrage_measure::{
 use umbrage_scene::Scene;
 use umbrage_trace::View;
 
-/// What to compare with the truth, and how finely.
+/// The techniques to compare with the truth, and the number of rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ComparisonOptions {
-    /// The techniques, all different.
+    /// The techniques, which must all differ.
     pub techniques: Vec<NamedTechnique>,
-    /// Rays along each side of a pixel, 1 to 64. Renderers shade at pixel centres only, as 1 does.
+    /// Rays along each side of a pixel, 1 to 64. Renderers shade at pixel centres only, as with 1.
     pub samples: u32,
 }
 
-/// What to compare in which view, planned.
+/// A planned comparison of techniques in one view.
 pub struct Comparison<'a> {
     prepared: &'a PreparedScene<'a>,
     options: &'a ComparisonOptions,
     chosen_view: ChosenView,
     chosen_light: ChosenLight,
     view: View<'a>,
-    /// One a technique, and how long planning took, milliseconds.
+    /// Plan of each technique, and the time that planning took, milliseconds.
     plans: Vec<(Plan, f64)>,
 }
 
-/// A comparison whose rays are all cast; what is left is to measure and to write.
+/// A comparison with all pictures rendered. What remains is to measure and write the results.
 pub struct Compared<'a> {
     comparison: &'a Comparison<'a>,
     truth: TruthSoFar,
@@ -53,7 +53,7 @@ pub struct Compared<'a> {
     motion: Option<umbrage_measure::Motion>,
 }
 
-/// A technique at work: its maps, and the picture so far.
+/// A technique in a comparison: its executor with the rendered maps, and its picture so far.
 struct Contender<'a> {
     technique: &'a NamedTechnique,
     plan: &'a Plan,
@@ -65,7 +65,7 @@ struct Contender<'a> {
     texels: Texels,
 }
 
-/// The truth's picture so far.
+/// The ray-traced picture so far, which is the truth.
 #[derive(Default)]
 struct TruthSoFar {
     shadowed: Shadowed,
@@ -73,7 +73,7 @@ struct TruthSoFar {
     seconds: f64,
 }
 
-/// What shadows look like, done.
+/// A finished picture with shadows.
 struct Picture {
     color: Image<Rgb>,
     visibility: Image<f32>,
@@ -83,8 +83,8 @@ impl<'a> Comparison<'a> {
     /// Plans every technique for this view and light.
     ///
     /// # Errors
-    /// A camera or light that the scene does not have, a view that no camera can have, a number of
-    /// rays out of range, and what the planner refuses.
+    /// An error if the scene has no such camera or light, if the view is not one that a camera can
+    /// have, if the number of rays is out of range, or if the planner refuses a technique.
     pub fn new(
         prepared: &'a PreparedScene<'a>,
         view: &ViewOptions,
@@ -102,10 +102,10 @@ impl<'a> Comparison<'a> {
         Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
     }
 
-    /// That all frames of a motion exist.
+    /// Checks that every frame of a motion has a valid view and light.
     ///
     /// # Errors
-    /// A frame's view that no camera can have, or a light that cannot turn.
+    /// An error if a frame's view is not one that a camera can have, or if the light cannot turn.
     pub fn check_motion(&self, motion: Motion, frames: u32) -> Result<(), Error> {
         motion.check(frames, self.chosen_view.look_at, self.chosen_light.light)
     }
@@ -114,25 +114,26 @@ impl<'a> Comparison<'a> {
         u64::from(self.chosen_view.camera.image()[1])
     }
 
-    /// Rows of rays and of measuring that there are to do.
+    /// Returns the number of rows of rays and of pixels to measure in the whole comparison.
     pub fn rows(&self) -> u64 {
         let plans = self.plans.iter().zip(&self.options.techniques);
         let rows_of_maps: u64 =
             plans.map(|((plan, _), t)| self.prepared.render.rows(plan, t.technique())).sum();
-        // Of the picture: what is seen, the truth; each technique's lookups and measuring.
+        // Rows of the picture: its surfaces and the truth, and each technique's lookup and
+        // measuring.
         rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
     }
 
-    /// Rows that [`Compared::move_on`] adds.
+    /// Returns the number of rows that [`Compared::move_on`] adds.
     pub fn rows_of_motion(&self, motion: Motion, frames: u32) -> u64 {
         let passes = if motion == Motion::Away { 2 } else { 1 };
         passes * u64::from(frames) * self.height()
     }
 
-    /// Renders the maps, and traces the truth and every technique's picture.
+    /// Renders the shadow maps, traces the truth, and renders every technique's picture.
     ///
     /// # Errors
-    /// What a GPU refuses, or maps that do not fit into memory.
+    /// An error if a GPU fails, or if the maps do not fit into memory.
     pub fn trace(&self, progress: &dyn Progress) -> Result<Compared<'_>, Error> {
         let mut contenders = Vec::new();
         for (technique, (plan, ms)) in self.options.techniques.iter().zip(&self.plans) {
@@ -158,16 +159,17 @@ impl<'a> Comparison<'a> {
 }
 
 impl Compared<'_> {
-    /// Whether the shadow in any pixel [counts](View::counts).
+    /// Returns whether any pixel has a shadow that [counts](View::counts).
     pub fn has_shadows(&self) -> bool {
         self.truth.counted.contains(&true)
     }
 
-    /// Measures how much every technique flickers in a motion of so many frames, and how much it
-    /// sparkles on the way away.
+    /// Measures how much every technique flickers in a motion of this many frames. For
+    /// [`Motion::Away`], also measures how much its pixels sparkle.
     ///
     /// # Errors
-    /// Frames that do not exist, and what the planner or a GPU refuses.
+    /// An error if a frame's view or light is invalid, if the planner refuses a technique, or if a
+    /// GPU fails.
     pub fn move_on(
         &mut self,
         motion: Motion,
@@ -196,11 +198,11 @@ impl Compared<'_> {
         Ok(())
     }
 
-    /// Measures, and writes `index.html`, `report.json` and the pictures into an empty `folder`.
-    /// `command` is what makes the report again, for people to copy.
+    /// Measures the results, and writes `index.html`, `report.json` and the pictures into an empty
+    /// `folder`. The page shows `command`, which makes the report again, for readers to copy.
     ///
     /// # Errors
-    /// Files that cannot be written.
+    /// An error if the results cannot be measured or a file cannot be written.
     pub fn write(
         self,
         folder: &Path,
@@ -248,8 +250,8 @@ impl Compared<'_> {
     }
 }
 
-/// Traces the truth and looks every technique's maps up, a band of the picture at a time, so that
-/// all share what the camera sees.
+/// Traces the truth and renders every technique's picture, a band of rows at a time. The truth and
+/// the CPU reference share the surfaces that the camera's rays hit.
 fn trace(
     view: &View<'_>,
     contenders: &mut [Contender<'_>],
@@ -291,7 +293,7 @@ impl Contender<'_> {
         let picture = Picture::new(size, self.shadowed)?;
         let error_px = Image::new(size, self.texels.error)?;
         let texels = texel_map(&Image::new(size, self.texels.texel)?, &picture.color)?;
-        // Where one map serves all there is nothing to tell apart.
+        // If a single map serves the whole picture, there is no partition to show.
         let partition = if self.plan.maps.iter().filter(|m| !ShadowMap::is_empty(m)).count() > 1 {
             Some(partition_map(&Image::new(size, self.texels.map)?, &picture.color)?)
         } else {

@@ -4,59 +4,59 @@ use std::path::PathBuf;
 use umbrage::Error as PlanError;
 use umbrage_scene::SceneError;
 
-/// What may be asked for. Errors name the one that they are about, and whoever asks may have other
-/// words for it: options of a command line, keys of a file, fields of a window.
+/// An input that a user can give. Errors name the field that they are about. A program may have its
+/// own words for the fields: options of a command line, keys of a file, or fields of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Field {
-    /// A file, or a built-in scene.
+    /// The scene: a file or a built-in scene.
     Scene,
-    /// Where the viewer is.
+    /// Position of the viewer.
     Eye,
-    /// What is in the middle of the picture.
+    /// Point in the middle of the picture.
     Target,
-    /// What is up in the picture.
+    /// Upward direction in the picture.
     Up,
-    /// The picture's vertical angle.
+    /// Vertical field of view.
     Fov,
-    /// Where the view begins.
+    /// Near distance of the view.
     Near,
-    /// Where it ends.
+    /// Far distance of the view.
     Far,
-    /// The picture's size.
+    /// Size of the picture.
     Size,
     /// A camera of the scene.
     Camera,
-    /// The way that parallel light travels.
+    /// Direction in which parallel light travels.
     Sun,
     /// A light of the scene.
     Light,
     /// A technique.
     Shadows,
-    /// The largest error of techniques that do not say how many texels there are.
+    /// Largest error of the techniques whose text gives no size.
     MaxError,
-    /// Rays along each side of a pixel.
+    /// Number of rays along each side of a pixel.
     Samples,
     /// What shadow maps are fitted to.
     Fit,
-    /// Whether masked materials are solid.
+    /// Whether alpha-masked materials are treated as solid.
     Opaque,
-    /// What renders.
+    /// The backend that renders.
     Backend,
-    /// What moves.
+    /// The motion of the viewer or the light.
     Motion,
     /// The file or folder to be written.
     Output,
-    /// The file of a sweep's views.
+    /// The file that lists the views of a sweep.
     Views,
-    /// The folder that paths of scenes start from.
+    /// The folder that the paths of a sweep's scenes are relative to.
     Scenes,
-    /// Folders of a sweep's shares.
+    /// The folders of a sweep's shares, which are to be joined.
     Merge,
 }
 
 impl Field {
-    /// Its name, one word.
+    /// Returns the name of the field, one word.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scene => "scene",
@@ -84,21 +84,21 @@ impl Field {
         }
     }
 
-    /// Whether a view of a sweep's file has it, so that it is called by its name there.
+    /// Returns whether the views in a sweep's file have this field, with its name as the key.
     pub(crate) fn is_of_view(self) -> bool {
         use Field::{Camera, Eye, Far, Fov, Light, Near, Scene, Size, Sun, Target, Up};
         [Scene, Eye, Target, Up, Fov, Near, Far, Size, Camera, Sun, Light].contains(&self)
     }
 }
 
-/// By its name.
+/// Shows the name of the field.
 impl Display for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-/// What [`PlanError`] calls a camera's and a light's fields, and who asks.
+/// Names of a camera's and a light's values in a [`PlanError`], and the fields that give them.
 const PLANNED: [(&str, Field); 8] = [
     ("camera.fov_y_rad", Field::Fov),
     ("camera.image", Field::Size),
@@ -110,88 +110,88 @@ const PLANNED: [(&str, Field); 8] = [
     ("light.direction", Field::Sun),
 ];
 
-/// Why something cannot be done.
+/// The reason why something cannot be done.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// A field's value makes no sense, or what it names cannot be had.
+    /// The value of a field is invalid, or what it names is not available.
     Field {
-        /// Which one.
+        /// The field.
         field: Field,
-        /// Which of the values that it may have, where that needs to be told.
+        /// The value, if the message has to say which of several values is meant.
         value: Option<String>,
-        /// What is wrong with it, and what would be right.
+        /// What is wrong with the value, and what would be valid.
         problem: String,
     },
-    /// A field that another one excludes.
+    /// Two fields cannot be used together.
     Excluded {
-        /// Which one.
+        /// The field that is refused.
         field: Field,
-        /// The other one.
+        /// The field that excludes it.
         by: Field,
     },
-    /// A view that ends before it begins; metres.
+    /// The far distance of a view does not exceed its near distance.
     Ends {
-        /// Where it begins.
+        /// Near distance, metres.
         near: f64,
-        /// Where it ends.
+        /// Far distance, metres.
         far: f64,
     },
-    /// A viewer who looks at where he is.
+    /// The eye and the target of a view are the same point.
     LooksAtEye {
-        /// Where that is, metres.
+        /// This point, metres.
         eye: DVec3,
     },
-    /// The planner cannot do with a camera or light.
+    /// The planner refuses the camera or the light.
     Planning(PlanError),
-    /// A technique cannot have as small an error as was asked for.
+    /// A technique cannot reach the largest error that was asked for.
     LargestError {
-        /// The text of the technique.
+        /// Text of the technique.
         shadows: String,
-        /// What was asked for, pixels per texel.
+        /// Largest error that was asked for, pixels per texel.
         pixels: f64,
-        /// What would be needed.
+        /// The planner's reason, which says what would be needed.
         problem: String,
     },
-    /// A folder that holds a sweep with other settings.
+    /// A folder holds a sweep with other settings.
     OtherSweep {
-        /// Who names the folder.
+        /// The field that gave the folder.
         field: Field,
         /// The folder.
         folder: PathBuf,
-        /// In what the sweeps differ.
+        /// The settings that differ.
         differences: Vec<Difference>,
     },
-    /// Shadow maps were to be looked up before any were rendered.
+    /// Shadow maps were looked up before any were rendered.
     NoMaps,
-    /// A scene's file cannot be read.
+    /// A scene cannot be read.
     Scene(SceneError),
-    /// Rays cannot be traced, or the reference's maps not be rendered.
+    /// Rays cannot be traced, or the CPU reference cannot render the maps.
     Rays(umbrage_trace::Error),
-    /// A GPU fails.
+    /// A GPU failed.
     Gpu(umbrage_render::Error),
-    /// Something cannot be measured or written.
+    /// A result cannot be measured or written.
     Measure(umbrage_measure::Error),
 }
 
-/// A setting that is not what it was.
+/// A setting that differs between a stored sweep and the one that was asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// Which one.
+    /// The field that differs.
     pub field: Field,
-    /// Its value there.
+    /// Its value in the folder.
     pub was: String,
-    /// The value asked for.
+    /// The value that was asked for.
     pub is: String,
 }
 
 impl Error {
-    /// A field's value makes no sense.
+    /// Makes an error about an invalid value of a field.
     pub(crate) fn field(field: Field, problem: impl Display) -> Self {
         Self::Field { field, value: None, problem: problem.to_string() }
     }
 
-    /// The error and what caused it on one line, with somebody's own words for the fields.
+    /// Returns the error and its causes on one line. `word` returns the caller's word for a field.
     pub fn in_words(&self, word: &dyn Fn(Field) -> String) -> String {
         let text = match self {
             Self::Field { field, value: None, problem } => format!("{}: {problem}", word(*field)),
@@ -239,14 +239,14 @@ impl Error {
     }
 }
 
-/// The fields by their names.
+/// Shows the error with the fields by their names.
 impl Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.in_words(&|field| field.name().to_owned()))
     }
 }
 
-// What caused it is part of its words.
+// The message already contains the causes, so `source` returns none.
 impl std::error::Error for Error {}
 
 impl From<SceneError> for Error {
@@ -273,21 +273,21 @@ impl From<umbrage_measure::Error> for Error {
     }
 }
 
-/// An error and what caused it.
+/// Returns the message of an error, followed by those of its causes.
 pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |e| e.source());
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
-/// Tells which field an error of others is about.
+/// Converts errors of other crates into errors about a field.
 pub(crate) trait About<T> {
-    /// The field's value does not work.
+    /// Converts the error into one that says that the field's value does not work.
     fn about(self, field: Field) -> Result<T, Error>;
 
-    /// The same, saying first what was tried.
+    /// Does the same as [`about`](Self::about), but first says what was tried.
     fn about_trying(self, field: Field, what: impl FnOnce() -> String) -> Result<T, Error>;
 
-    /// The GPU that was asked for, or taken, does not work.
+    /// Converts the error into one that says that the GPU does not work.
     fn on_gpu(self) -> Result<T, Error>;
 }
 

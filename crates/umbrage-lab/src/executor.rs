@@ -1,4 +1,4 @@
-//! Who renders shadow maps and looks them up: a GPU, or the reference on the CPU.
+//! Executors, which render shadow maps and look them up: a GPU, or the reference on the CPU.
 
 use crate::error::{About, Error};
 use crate::executors::{Executors, GPU, REFERENCE, runs_on_gpu};
@@ -10,17 +10,19 @@ use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer};
 use umbrage_wgpu::{Casters, ShadowOptions};
 
-/// A scene where it can be rendered: in the memory of rays, and in a GPU's if there is one.
+/// A scene that is ready to be rendered, by rays on the CPU and, if there is one, on a GPU.
 pub struct RenderScene<'a> {
     tracer: Tracer<'a>,
     gpu: Option<(&'a Gpu, SceneBuffers<'a>)>,
 }
 
 impl<'a> RenderScene<'a> {
-    /// `opaque`: alpha-masked materials cast and show as solid.
+    /// Prepares the scene. If `opaque` is true, alpha masks are ignored, so that masked materials
+    /// show and cast as solid.
     ///
     /// # Errors
-    /// A scene that refers to what it does not have, or that a GPU does not hold.
+    /// An error if the scene refers to something that it does not contain, or if a GPU cannot hold
+    /// it.
     pub fn new(scene: &'a Scene, executors: &'a Executors, opaque: bool) -> Result<Self, Error> {
         let tracer = Tracer::new(scene)?.opaque(opaque);
         let buffers = |gpu| SceneBuffers::new(gpu, scene, opaque).on_gpu();
@@ -28,25 +30,25 @@ impl<'a> RenderScene<'a> {
         Ok(Self { tracer, gpu })
     }
 
-    /// The scene, ready for rays.
+    /// Returns the scene in the form that rays are traced in.
     pub fn tracer(&self) -> &Tracer<'a> {
         &self.tracer
     }
 
-    /// Rows that rendering a technique's plan will report.
+    /// Returns the number of rows that rendering a technique's plan will report.
     pub fn rows(&self, plan: &Plan, technique: &Technique) -> u64 {
         self.gpu_for(technique).map_or_else(|| Reference::rows(plan), |_| 0)
     }
 
-    /// The GPU, if there is one that can render a technique.
+    /// Returns the GPU and its buffers, if there is a GPU that can render the technique.
     fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers<'a>)> {
         self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
     }
 
-    /// Who renders a technique.
+    /// Returns the executor that renders the technique.
     ///
     /// # Errors
-    /// What a GPU refuses.
+    /// An error if the GPU does not support the technique.
     pub fn executor(&self, technique: &Technique) -> Result<Executor<'_>, Error> {
         let filter = technique.filter;
         let work = match self.gpu_for(technique) {
@@ -63,29 +65,29 @@ impl<'a> RenderScene<'a> {
     }
 }
 
-/// Renders a technique's maps and looks them up.
+/// Renders a technique's shadow maps and looks them up.
 pub struct Executor<'a> {
     pub(crate) work: Work<'a>,
 }
 
-/// Who does it.
+/// The GPU or the CPU reference that does the work, with the maps that are rendered.
 pub(crate) enum Work<'a> {
     Gpu(Box<OnGpu<'a>>),
     Reference { tracer: &'a Tracer<'a>, maps: Option<(&'a Plan, Reference<'a>)> },
 }
 
-/// A GPU at work.
+/// A GPU that renders a technique.
 pub(crate) struct OnGpu<'a> {
     pub(crate) renderer: Renderer<'a, 'a>,
     pub(crate) gpu: &'a Gpu,
-    /// Tells how long filtering takes, where there is anything to tell.
+    /// Measures the time of the prefilter; `None` without a prefilter or without timestamps.
     timer: Option<Timer>,
-    /// Whose maps are drawn.
+    /// The plan whose maps are drawn.
     plan: Option<&'a Plan>,
 }
 
 impl OnGpu<'_> {
-    /// What rows of a picture show; where texels lie only if that is wanted.
+    /// Returns rows of a picture. Texels are only computed if `wants_texels` is true.
     fn strip(&mut self, rows: &Rows<'_>, wants_texels: bool) -> Result<Strip, Error> {
         let view = rows.view();
         let shading = Shading { camera: view.camera(), light: view.light(), light_index: 0 };
@@ -95,21 +97,21 @@ impl OnGpu<'_> {
 }
 
 impl<'a> Executor<'a> {
-    /// `gpu` or `reference`.
+    /// Returns `gpu` or `reference`.
     pub fn name(&self) -> &'static str {
         if self.is_gpu() { GPU } else { REFERENCE }
     }
 
-    /// Whether it is a GPU.
+    /// Returns whether the executor is a GPU.
     pub fn is_gpu(&self) -> bool {
         matches!(self.work, Work::Gpu(_))
     }
 
-    /// Renders the maps of a plan, in place of those of the one before. Gives the milliseconds that
-    /// filtering took of that, where they are told apart.
+    /// Renders the maps of a plan, which replace those of the plan before. Returns how much of the
+    /// time filtering took, milliseconds, if that can be measured separately.
     ///
     /// # Errors
-    /// What a GPU refuses, or maps that do not fit into memory.
+    /// An error if a GPU fails, or if the maps do not fit into memory.
     pub fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<Option<f64>, Error> {
         match &mut self.work {
             Work::Gpu(on) => {
@@ -126,7 +128,7 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// Memory of what lookup reads of the maps that are rendered, bytes.
+    /// Returns the memory that lookup reads of the rendered maps, bytes.
     pub fn bytes(&self) -> u64 {
         match &self.work {
             Work::Gpu(on) => on.renderer.shadows().lookup_bytes(),
@@ -134,10 +136,10 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// What rows of a picture show with the maps that are rendered.
+    /// Returns rows of a picture with the shadows of the rendered maps.
     ///
     /// # Errors
-    /// What a GPU refuses, or [`Error::NoMaps`].
+    /// An error if a GPU fails, or [`Error::NoMaps`] if the CPU reference has rendered no maps.
     pub fn strip(&mut self, rows: &Rows<'_>) -> Result<Strip, Error> {
         match &mut self.work {
             Work::Gpu(on) => on.strip(rows, true),
@@ -148,23 +150,24 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// What rows of a picture show without any maps.
+    /// Returns rows of a picture without shadow maps. A GPU executor must not have rendered maps
+    /// before.
     ///
     /// # Errors
-    /// What a GPU refuses.
+    /// An error if a GPU fails.
     pub fn shape(&mut self, rows: &Rows<'_>) -> Result<Strip, Error> {
         match &mut self.work {
-            // Maps that there are not let all light through.
+            // A renderer that has drawn no maps lets all light through.
             Work::Gpu(on) => on.strip(rows, false),
             Work::Reference { .. } => Ok(rows.in_full_light()),
         }
     }
 
-    /// How much light the maps that are rendered let through to points of surfaces that face it, 0
-    /// to 1 each.
+    /// Returns how much light the rendered maps let through to each sample, 0 to 1. The samples
+    /// must be on surfaces that face the light.
     ///
     /// # Errors
-    /// What a GPU refuses, or [`Error::NoMaps`].
+    /// An error if a GPU fails, or [`Error::NoMaps`] if no maps were rendered.
     pub fn visibility(&mut self, samples: &[&Sample]) -> Result<Vec<f32>, Error> {
         match &mut self.work {
             Work::Gpu(on) => {

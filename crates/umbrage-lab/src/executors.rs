@@ -1,36 +1,37 @@
-//! What there is to render with.
+//! The available executors: the CPU reference and, if there is one, a GPU.
 
 use crate::error::{Error, Field};
 use crate::technique::NamedTechnique;
 use umbrage::{Technique, Warp};
 use umbrage_render::Gpu;
 
-/// What shall render shadow maps.
+/// The backend that renders shadow maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backend {
-    /// The GPU if there is one, else the reference.
+    /// The GPU if there is one and it can render the technique, otherwise the CPU reference.
     Auto,
     /// A GPU.
     Gpu,
-    /// Rays on the CPU.
+    /// The CPU reference, which traces rays.
     Reference,
 }
 
-/// What there is to render with: the reference always, and a GPU or none.
+/// The available executors: always the CPU reference, and a GPU if one was opened.
 pub struct Executors {
     gpu: Option<Gpu>,
     choice: Option<String>,
 }
 
-/// What reports call the two.
+/// Names of the two backends in reports.
 pub(crate) const GPU: &str = "gpu";
 pub(crate) const REFERENCE: &str = "reference";
 
 impl Executors {
-    /// Opens what is asked for, for these techniques.
+    /// Opens the executors that the backend needs for these techniques.
     ///
     /// # Errors
-    /// A GPU that was asked for and is not there, or that cannot render one of the techniques.
+    /// An error if a GPU was asked for and there is none, or if it cannot render one of the
+    /// techniques.
     pub fn open(backend: Backend, techniques: &[NamedTechnique]) -> Result<Self, Error> {
         let log = techniques.iter().find(|t| !runs_on_gpu(t.technique()));
         let wrong = |problem: String| Err(Error::field(Field::Backend, problem));
@@ -65,28 +66,29 @@ impl Executors {
         }
     }
 
-    /// What was chosen, a line to be told, if the choice was ours.
+    /// Returns a line that tells the user what renders; `None` if the user chose the backend.
     pub fn choice(&self) -> Option<&str> {
         self.choice.as_deref()
     }
 
-    /// The GPU, if there is one.
+    /// Returns the GPU, if one was opened.
     pub(crate) fn gpu(&self) -> Option<&Gpu> {
         self.gpu.as_ref()
     }
 
-    /// What renders whatever can be rendered so: `gpu` or `reference`.
+    /// Returns `gpu` if a GPU was opened, even if it cannot render every technique, else
+    /// `reference`.
     pub fn name(&self) -> &'static str {
         if self.gpu.is_some() { GPU } else { REFERENCE }
     }
 
-    /// The GPU's own name, if there is one.
+    /// Returns the name of the GPU itself, if one was opened.
     pub fn device(&self) -> Option<String> {
         self.gpu.as_ref().map(|gpu| gpu.info().name.clone())
     }
 }
 
-/// Whether a GPU can render a technique: the rows of `log` bend.
+/// Returns whether a GPU can render the technique. None can with the `log` warp, whose rows bend.
 pub(crate) fn runs_on_gpu(technique: &Technique) -> bool {
     technique.warp != Warp::Log
 }

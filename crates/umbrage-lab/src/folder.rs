@@ -1,24 +1,24 @@
-//! Files that are there whole or not at all.
+//! Files and folders that are written whole or not at all.
 
 use crate::error::{About, Error, Field};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// How the names of all that is unfinished begin.
+/// Prefix of the names of unfinished files and folders.
 pub(crate) const TEMPORARY: &str = ".umbrage-";
 
-/// What a view of a sweep was made from, beside its report or instead of one.
+/// File that records what a view of a sweep was made from, beside the view's report if it has one.
 pub(crate) const VIEW_RECORD: &str = "view.json";
 
-/// An error about what is to be written.
+/// Returns an error about the output path.
 fn wrong<T>(problem: String) -> Result<T, Error> {
     Err(Error::field(Field::Output, problem))
 }
 
-/// The folder that holds `path`.
+/// Returns the folder that contains `path`.
 ///
 /// # Errors
-/// A path without a name of its own, or whose folder is not there.
+/// An error if `path` has no file name, or if the folder does not exist or is not a folder.
 pub(crate) fn existing_parent(path: &Path) -> Result<PathBuf, Error> {
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if path.file_name().is_none() {
@@ -31,10 +31,11 @@ pub(crate) fn existing_parent(path: &Path) -> Result<PathBuf, Error> {
     }
 }
 
-/// Checks, before any work, that a file can be written to `path`.
+/// Checks, before any work is done, that a file can be written to `path`.
 ///
 /// # Errors
-/// A path of a folder, or whose folder is not there or cannot be written in.
+/// An error if `path` has no file name or is a folder, or if the folder that contains it does not
+/// exist or cannot be written to.
 pub fn check_file(path: &Path) -> Result<(), Error> {
     let parent = existing_parent(path)?;
     if path.is_dir() {
@@ -43,13 +44,14 @@ pub fn check_file(path: &Path) -> Result<(), Error> {
     Staging::new(&parent).map(drop)
 }
 
-/// A folder beside its destination in which files grow unseen. Dropped, it vanishes with all in it.
+/// A temporary folder beside the destination, in which files are written before they are moved into
+/// place. Dropping it removes the folder with all its contents.
 struct Staging {
     path: PathBuf,
 }
 
 impl Staging {
-    /// An empty folder in `parent`.
+    /// Makes an empty temporary folder in `parent`.
     fn new(parent: &Path) -> Result<Self, Error> {
         for attempt in 0..1000 {
             let path = parent.join(format!("{TEMPORARY}{}-{attempt}", std::process::id()));
@@ -65,24 +67,24 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // An empty or half-filled temporary folder that cannot be removed is no reason to fail.
+        // A temporary folder that cannot be removed is no reason to fail.
         let _ = std::fs::remove_dir_all(&self.path);
     }
 }
 
-/// What a report's folder holds, so that a former report is told from what somebody needs.
+/// Contents of a report's folder, by which a former report is told from files that somebody needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents {
-    /// What it is called, as in `a report`.
+    /// Name of the report with its article, such as `a report`.
     pub name: &'static str,
-    /// Whether a folder with files of these names is a former one.
+    /// Whether a folder with files of these names holds a former report.
     pub is_former: fn(&[String]) -> bool,
-    /// Whether a former one may have had a file of this name.
+    /// Whether a former report may contain a file of this name.
     pub may_have: fn(&str) -> bool,
 }
 
 impl Contents {
-    /// A comparison of techniques.
+    /// Contents of the report of a comparison.
     pub const COMPARISON: Self = Self {
         name: "a report",
         is_former: |names| {
@@ -95,7 +97,7 @@ impl Contents {
     };
 }
 
-/// The folder of a report: where it will stand, and what stands there now.
+/// The place for a report's folder, where a former report may be now.
 pub struct ReportFolder {
     target: PathBuf,
     parent: PathBuf,
@@ -103,11 +105,11 @@ pub struct ReportFolder {
 }
 
 impl ReportFolder {
-    /// Checks, before any work, that a report can be written to `target`: a new folder, an empty
-    /// one, or a former report, which will be replaced.
+    /// Checks, before any work is done, that a report can be written to `target`. The folder must
+    /// be new, empty, or a former report, which will be replaced.
     ///
     /// # Errors
-    /// A folder that holds something else, or that cannot be written.
+    /// An error if the folder holds something else, or if it cannot be written.
     pub fn check(target: &Path, contents: Contents) -> Result<Self, Error> {
         let parent = existing_parent(target)?;
         Staging::new(&parent)?;
@@ -141,12 +143,12 @@ impl ReportFolder {
         }
     }
 
-    /// Puts a new report in place, whole: `write` fills a folder, which then takes the place of
-    /// whatever stood there.
+    /// Writes a new report, whole or not at all: `write` fills a temporary folder, which then
+    /// replaces what was at the destination.
     ///
     /// # Errors
-    /// Those of `write`, and whatever keeps the report from its place; then what stood there still
-    /// does.
+    /// The errors of `write`. Also an error if the report cannot be moved to its destination. In
+    /// both cases the former report is kept.
     pub fn replace<T, E: From<Error>>(
         &self,
         write: impl FnOnce(&Path) -> Result<T, E>,
@@ -155,7 +157,7 @@ impl ReportFolder {
         let report = new.path.join("new");
         std::fs::create_dir(&report).about(Field::Output)?;
         let written = write(&report)?;
-        // Someone may have put something there while we worked.
+        // Somebody may have put files there in the meantime.
         self.check_replaceable()?;
         let former = new.path.join("former");
         let has_former = self.target.exists();
@@ -165,7 +167,8 @@ impl ReportFolder {
             }
             std::fs::rename(&report, &self.target).inspect_err(|_| {
                 if has_former {
-                    // The former report is better than none; the first error is the one to tell.
+                    // The former report is better than none. If this fails too, the first error is
+                    // returned.
                     let _ = std::fs::rename(&former, &self.target);
                 }
             })
@@ -176,7 +179,7 @@ impl ReportFolder {
     }
 }
 
-/// Names of all that is in a folder, sorted.
+/// Returns the names of all files and folders in a folder, sorted.
 pub(crate) fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     let entries = std::fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
     let mut names: Vec<String> =

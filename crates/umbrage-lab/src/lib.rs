@@ -1,6 +1,6 @@
-//! Runs shadow techniques on scenes and measures them against ray-traced truth: in one view, in a
-//! motion, in many views. A program, a window or a page says what it wants in plain structs, is
-//! told of the [`Progress`], and gets figures, pictures and reports.
+//! Runs shadow techniques on scenes and compares them with ray-traced truth: in one view, in a
+//! motion or in many views. A program describes in plain structs what it wants, is told of the
+//! [`Progress`], and gets figures, pictures and reports.
 //!
 //! ```text
 //! open_scene ──────► PreparedScene ──► Comparison ──► Compared ──► report's folder
@@ -10,17 +10,18 @@
 //! sweep, join_shares: a Comparison for each view of a file
 //! ```
 //!
-//! - [`ViewOptions`] and [`LightOptions`] are what may be asked for; [`choose_view`] and
-//!   [`choose_light`] fill in what is left open from the scene.
-//! - A [`NamedTechnique`] is a technique and the text that asked for it, by which reports call it.
-//! - [`Executors`] are what there is to render with, a GPU or the reference; a [`RenderScene`] is a
-//!   scene ready for them.
-//! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view, [`sweep()`]
-//!   in many.
+//! - [`ViewOptions`] and [`LightOptions`] describe the view and the light that a user asks for.
+//!   [`choose_view`] and [`choose_light`] take what is left out from the scene.
+//! - A [`NamedTechnique`] is a technique with the text that describes it. Reports name the
+//!   technique by this text.
+//! - [`Executors`] are what renders: the CPU reference and, if there is one, a GPU. A
+//!   [`RenderScene`] is a scene prepared for them.
+//! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view; [`sweep()`]
+//!   compares them in many.
 //!
-//! Nothing here prints, parses command lines, or asks about the process. What is wrong is an
-//! [`Error`], which names the [`Field`] that it is about; whoever has other words for the fields
-//! says so ([`Error::in_words`]).
+//! This crate does not print, parse command lines or query its process. An [`Error`] about a value
+//! names the [`Field`] that it belongs to. A program that calls the fields differently passes its
+//! own words to [`Error::in_words`].
 //!
 //! ```
 //! use std::path::Path;
@@ -39,7 +40,7 @@
 //! let prepared = PreparedScene::new(&scene, &executors, false, Fit::Surfaces)?;
 //! let comparison = Comparison::new(&prepared, &view, &LightOptions::default(), &options)?;
 //! let folder = tempfile::tempdir()?;
-//! // Nobody is told how far it is.
+//! // `()` ignores the progress.
 //! let report = comparison.trace(&())?.write(folder.path(), "an example", &())?;
 //! assert_eq!(report.results[1].shadows, "lispsm@64");
 //! assert!(report.results[0].metrics.wrong_fraction < Some(0.2));

@@ -1,4 +1,4 @@
-//! Lights: what may be asked for, and what is taken.
+//! Lights: the options that a user may give, and the light that follows from them.
 
 use crate::error::{Error, Field};
 use crate::scene::find;
@@ -8,24 +8,25 @@ use umbrage::Light;
 use umbrage_measure::LightInfo;
 use umbrage_scene::Scene;
 
-/// Light of an afternoon: 45° high, from the side and a little from behind a viewer who looks along
-/// −z.
+/// Direction of afternoon light: 45° high, from the side and a little from behind a viewer who
+/// looks along −z.
 const AFTERNOON_SUN: DVec3 = DVec3::new(-0.6, -1.0, -0.8);
 
-/// The light that somebody asks for. Left out: the scene's first, else a 45° afternoon sun.
+/// The light that a user asks for. Without one, [`Scene::default_light`] or, without a scene, an
+/// afternoon sun at 45°.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightOptions {
-    /// Parallel light: the way it travels, of any length; not with a light of the scene.
+    /// Direction in which parallel light travels, of any length; cannot be combined with `light`.
     pub sun: Option<DVec3>,
-    /// A light of the scene, by name.
+    /// Name of a light of the scene.
     pub light: Option<String>,
 }
 
 impl LightOptions {
-    /// That each value makes sense, and that they go together.
+    /// Checks each value and their combination.
     ///
     /// # Errors
-    /// The first that does not.
+    /// An error if `sun` is not a valid direction, or if both `sun` and `light` are given.
     pub fn check(&self) -> Result<(), Error> {
         if let Some(sun) = self.sun {
             values::pointing(sun).map_err(|p| Error::field(Field::Sun, p))?;
@@ -37,17 +38,17 @@ impl LightOptions {
     }
 }
 
-/// A light, and where it came from.
+/// A light, and its name in the scene if it comes from there.
 #[derive(Clone, Debug)]
 pub struct ChosenLight {
-    /// Its name in the scene, if it is from there.
+    /// Name of the light in the scene, if it comes from there.
     pub name: Option<String>,
     /// The light itself.
     pub light: Light,
 }
 
 impl ChosenLight {
-    /// As reports tell it.
+    /// Returns the light in the form that reports show.
     pub fn info(&self) -> LightInfo {
         let name = self.name.clone();
         match self.light {
@@ -68,10 +69,10 @@ impl ChosenLight {
     }
 }
 
-/// The light that is asked for, else the scene's own.
+/// Returns the light that is asked for or, if there is none, the scene's default light.
 ///
 /// # Errors
-/// A light that the scene does not have.
+/// An error if the scene has no light of that name.
 pub fn choose_light(options: &LightOptions, scene: Option<&Scene>) -> Result<ChosenLight, Error> {
     if let Some(direction) = options.sun {
         return Ok(ChosenLight { name: None, light: Light::Directional { direction } });

@@ -1,5 +1,5 @@
-//! What a motion shows: shadows that change from frame to frame where the truth does not, and
-//! pixels that sparkle as a scene gets smaller.
+//! Errors that show in motion: shadows that change from frame to frame where the truth does not,
+//! and pixels that sparkle as a scene gets smaller in the picture.
 
 mod flicker;
 mod frames;

@@ -1,22 +1,22 @@
-//! Pictures that grow strip by strip, from the top: a value a pixel.
+//! Pictures that grow strip by strip, from the top, with one value for each pixel.
 
 use crate::strip::Strip;
 use glam::Vec3;
 use umbrage_measure::Rgb;
 use umbrage_trace::shade;
 
-/// What shadows look like, whoever made them.
+/// A picture with shadows, whether traced or rendered with shadow maps.
 #[derive(Clone, Debug, Default)]
 pub struct Shadowed {
-    /// The shaded picture.
+    /// Colours of the shaded picture.
     pub color: Vec<Rgb>,
-    /// 0 (in shadow) ..= 1 (lit). Over the samples that count, if there are any in a pixel; else
-    /// over all, the sky being lit.
+    /// Visibility, 0 (in shadow) to 1 (lit): the mean over the pixel's counted samples or, without
+    /// any, over all its samples, where the sky is lit.
     pub visibility: Vec<f32>,
 }
 
 impl Shadowed {
-    /// Adds a strip.
+    /// Appends a strip.
     pub fn push(&mut self, strip: &Strip) {
         let n = strip.samples_per_pixel;
         self.color.extend(shade::pixels(&strip.radiance, n));
@@ -26,20 +26,20 @@ impl Shadowed {
     }
 }
 
-/// Where a map's texels lie on what is seen.
+/// Positions and sizes of shadow-map texels in the picture.
 #[derive(Clone, Debug, Default)]
 pub struct Texels {
-    /// Pixels per texel in the worst direction, the mean over the samples that count; NaN where
-    /// none does or no map serves it.
+    /// Pixels per texel in the worst direction, the mean over the counted samples; NaN if no sample
+    /// counts or if no map serves one that counts.
     pub error: Vec<f32>,
-    /// Texel coordinates s and t in the middle of the pixel; NaN where no map serves it.
+    /// Texel coordinates s and t in the middle of the pixel; NaN if no map serves it.
     pub texel: Vec<[f32; 2]>,
-    /// Index of the map that serves the middle of the pixel.
+    /// Index in the plan of the map that serves the middle of the pixel.
     pub map: Vec<Option<u16>>,
 }
 
 impl Texels {
-    /// Adds a strip.
+    /// Appends a strip.
     pub fn push(&mut self, strip: &Strip) {
         let means = strip.means(|i| strip.lookups[i].error);
         self.error.extend(means.map(|m| m.unwrap_or(f32::NAN)));
@@ -50,19 +50,19 @@ impl Texels {
     }
 }
 
-/// What is seen, apart from its shadows.
+/// The visible surfaces, apart from their shadows.
 #[derive(Clone, Debug, Default)]
 pub struct Shape {
     /// Linear colour of each pixel: red, green, blue.
     pub radiance: Vec<[f32; 3]>,
-    /// In the middle of each pixel, metres; infinite in the sky.
+    /// Depth in the middle of each pixel, metres; infinite in the sky.
     pub depth: Vec<f32>,
-    /// In the middle of each pixel, world space; zero in the sky.
+    /// Shading normal in the middle of each pixel, world space; zero in the sky.
     pub normal: Vec<Vec3>,
 }
 
 impl Shape {
-    /// Adds a strip.
+    /// Appends a strip.
     pub fn push(&mut self, strip: &Strip) {
         let n = strip.samples_per_pixel;
         let pixels = strip.radiance.chunks(n);

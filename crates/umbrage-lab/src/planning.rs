@@ -1,20 +1,21 @@
-//! Plans, and how long planning takes.
+//! Planning of shadow maps, and the time that it takes.
 
 use crate::error::Error;
 use crate::technique::{MAX_SIDE, NamedTechnique};
 use std::time::Instant;
 use umbrage::{Bounds, Camera, Light, Limits, Plan, Planner};
 
-/// A planner for whatever a technique may ask for.
+/// Returns a planner that allows maps as large as a technique may ask for.
 pub fn planner() -> Planner {
     Planner::with_limits(Limits { max_side: MAX_SIDE, ..Limits::default() })
 }
 
-/// A technique's plan for one light, and how long planning takes, milliseconds, once buffers have
-/// grown.
+/// Plans a technique for one light. Returns the plan and the time that planning takes,
+/// milliseconds, once the planner's buffers have grown.
 ///
 /// # Errors
-/// What the planner refuses, naming the part of the technique's text that is to blame.
+/// An error if the planner refuses the technique, the camera or the light. It names the part of the
+/// technique's text that is to blame, if any.
 pub fn plan(
     technique: &NamedTechnique,
     camera: &Camera,
@@ -32,7 +33,7 @@ pub fn plan(
     plan()
 }
 
-/// Since `start`.
+/// Returns the milliseconds since `start`.
 pub fn milliseconds(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }

@@ -1,4 +1,4 @@
-//! A scene, ready for whatever is to be found out about it.
+//! A scene that is ready for comparisons.
 
 use crate::error::Error;
 use crate::executor::RenderScene;
@@ -6,7 +6,7 @@ use crate::executors::Executors;
 use crate::receivers::{Fit, Receivers};
 use umbrage_scene::Scene;
 
-/// A scene, ready for comparisons in many views.
+/// A scene that is ready for comparisons in many views.
 pub struct PreparedScene<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) executors: &'a Executors,
@@ -16,10 +16,12 @@ pub struct PreparedScene<'a> {
 }
 
 impl<'a> PreparedScene<'a> {
-    /// `opaque`: alpha-masked materials cast and show as solid.
+    /// Prepares the scene. If `opaque` is true, alpha masks are ignored, so that masked materials
+    /// show and cast as solid.
     ///
     /// # Errors
-    /// A scene that refers to what it does not have, or that a GPU does not hold.
+    /// An error if the scene refers to something that it does not contain, or if a GPU cannot hold
+    /// it.
     pub fn new(
         scene: &'a Scene,
         executors: &'a Executors,
@@ -31,7 +33,7 @@ impl<'a> PreparedScene<'a> {
         Ok(Self { scene, executors, render, receivers, opaque })
     }
 
-    /// What readers of a report should know.
+    /// Returns the notices for readers of a report.
     pub(crate) fn notices(&self) -> Vec<String> {
         let mut notices: Vec<String> = self.scene.notices.iter().map(|n| n.0.clone()).collect();
         if self.opaque {

@@ -1,42 +1,42 @@
 use umbrage_scene::Scene;
 
-/// Is told how far a job is, on any thread. All that it does not want to hear it may leave out;
-/// `()` hears nothing.
+/// Receives the progress of a job, on any thread. By default each method does nothing, and `()`
+/// ignores everything.
 ///
-/// A job has parts that count alike, one if nobody says otherwise. Each part has rows: of rays, or
-/// of pixels to measure.
+/// A job has parts of equal weight, and only one part unless [`parts`](Self::parts) says otherwise.
+/// Each part has rows: rows of rays, or rows of pixels to measure.
 pub trait Progress: Sync {
-    /// The job has so many parts.
+    /// The job has this many parts.
     fn parts(&self, _count: u64) {}
 
     /// A part of this name begins.
     fn part(&self, _name: &str) {}
 
-    /// So many rows are ahead in this part.
+    /// This many rows have to be done in this part.
     fn rows(&self, _rows: u64) {}
 
-    /// What goes on from now, as in `ray-traced truth`.
+    /// A stage of this name begins, such as `ray-traced truth`.
     fn stage(&self, _name: &str) {}
 
-    /// So many more rows are done.
+    /// This many more rows are done.
     fn advance(&self, _rows: u64) {}
 
     /// The part is done.
     fn end_part(&self) {}
 
-    /// A scene that was asked for by this name was read; people may want to see its notices.
+    /// The scene of this name was read. It may have notices for the user.
     fn scene(&self, _name: &str, _scene: &Scene) {}
 
-    /// A view of a sweep failed, and why.
+    /// A view of a sweep failed with this error.
     fn failed(&self, _view: &str, _error: &str) {}
 
-    /// What was taken to render with, as the choice was not the user's.
+    /// The backend was chosen automatically. The text says what renders.
     fn backend(&self, _choice: &str) {}
 
-    /// Something that people may want to know, a line.
+    /// A line of information for the user.
     fn note(&self, _line: &str) {}
 
-    /// Something that may not be what people meant, a line.
+    /// A line of warning: something may not be what the user meant.
     fn warn(&self, _line: &str) {}
 }
 

@@ -1,4 +1,4 @@
-//! Where shadows fall.
+//! Receivers: the places where shadows can fall.
 
 use umbrage::{Aabb, Bounds};
 use umbrage_scene::Scene;
@@ -7,14 +7,14 @@ use umbrage_trace::Tracer;
 /// What shadow maps are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fit {
-    /// The box around the scene, air and all.
+    /// The bounding box of the scene, empty space included.
     Box,
-    /// Some hundred boxes around its surfaces.
+    /// Up to some hundred boxes around the scene's surfaces.
     Surfaces,
 }
 
 impl Fit {
-    /// One word: `box` or `surfaces`.
+    /// Returns `box` or `surfaces`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Box => "box",
@@ -23,17 +23,17 @@ impl Fit {
     }
 }
 
-/// Where a scene's shadows fall, as far as the planner is told.
+/// The receivers of a scene, as the planner gets them.
 pub struct Receivers {
     all: Aabb,
     parts: Vec<Aabb>,
 }
 
-/// Boxes around a scene's surfaces. More make planning slower and the maps hardly finer.
+/// Largest number of boxes around surfaces. More make planning slower and the maps hardly finer.
 const SURFACE_BOXES: usize = 256;
 
 impl Receivers {
-    /// As `fit` has it, from the tree that the scene's rays are traced with.
+    /// Returns the receivers that `fit` selects. Boxes around surfaces come from the tracer's tree.
     pub fn new(scene: &Scene, tracer: &Tracer<'_>, fit: Fit) -> Self {
         match fit {
             Fit::Box => Self::in_box(scene),
@@ -41,12 +41,12 @@ impl Receivers {
         }
     }
 
-    /// Anywhere in the box around the scene: needs no rays.
+    /// Returns the bounding box of the scene as the only receiver. This needs no tracer.
     pub fn in_box(scene: &Scene) -> Self {
         Self { all: scene.bounds(), parts: Vec::new() }
     }
 
-    /// What the planner is told.
+    /// Returns the receivers as bounds for the planner.
     pub fn bounds(&self) -> Bounds<'_> {
         Bounds { receiver_parts: &self.parts, ..Bounds::of_scene(self.all) }
     }

@@ -1,15 +1,15 @@
-//! Scenes by their names.
+//! Finds scenes, cameras and lights by their names.
 
 use crate::error::{About, Error, Field};
 use std::path::{Path, PathBuf};
 use umbrage_scene::{Scene, SceneError, builtins};
 
-/// The scene of this name: a file if there is one, looked for from `folder`, else a built-in scene,
-/// `name` or `name:size`.
+/// Opens the scene of this name: a file, relative to `folder`, or else a built-in scene, whose name
+/// is written `name` or `name:size`.
 ///
 /// # Errors
-/// A name that neither a file nor a built-in scene has; a file that cannot be read or has nothing
-/// to draw.
+/// An error if there is neither a file nor a built-in scene of this name, if the file cannot be
+/// read, or if the scene has no triangles to draw.
 pub fn open_scene(folder: &Path, name: &str) -> Result<Scene, Error> {
     let scene = match scene_file(folder, name) {
         Some(path) => umbrage_scene::load(&path)?,
@@ -21,12 +21,12 @@ pub fn open_scene(folder: &Path, name: &str) -> Result<Scene, Error> {
     }
 }
 
-/// The file of a scene; `None` if it is not there, then the scene may be built in.
+/// Returns the file of a scene; `None` if there is no file, so that the scene may be built in.
 pub(crate) fn scene_file(folder: &Path, name: &str) -> Option<PathBuf> {
     Some(folder.join(name)).filter(|path| path.exists() && !path.is_dir())
 }
 
-/// A scene that is not in a file.
+/// Opens a built-in scene.
 fn built_in(folder: &Path, name: &str) -> Result<Scene, Error> {
     let wrong = |problem: String| Err(Error::field(Field::Scene, problem));
     let (builtin, size) = match name.split_once(':') {
@@ -55,13 +55,13 @@ fn built_in(folder: &Path, name: &str) -> Result<Scene, Error> {
     umbrage_scene::builtin(builtin, size).about(Field::Scene)
 }
 
-/// SHA-256 of a scene's files, one after the other, as hexadecimal digits; `None` where there is
-/// none to be read.
+/// Returns the SHA-256 of the scene's files, one after the other, as hexadecimal digits; `None` if
+/// there is no file or if a file cannot be read.
 pub(crate) fn digest(folder: &Path, name: &str) -> Option<String> {
     use sha2::{Digest, Sha256};
 
     let file = scene_file(folder, name)?;
-    // Of a broken scene the file itself must do.
+    // If the scene is broken, only the named file itself is hashed.
     let files = umbrage_scene::files(&file).unwrap_or_else(|_: SceneError| vec![file]);
     let mut sha = Sha256::new();
     for file in files {
@@ -70,10 +70,10 @@ pub(crate) fn digest(folder: &Path, name: &str) -> Option<String> {
     Some(sha.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// Index of `name` among those of a scene's cameras or lights.
+/// Returns the index of `name` among the names of a scene's cameras or lights.
 ///
 /// # Errors
-/// A name that none has; all of them are listed.
+/// An error that lists all names, if `name` is not among them.
 pub(crate) fn find<'a>(
     field: Field,
     name: &str,

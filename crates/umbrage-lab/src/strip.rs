@@ -1,4 +1,4 @@
-//! What some rows of a picture show, a value a sample, whoever found it.
+//! Some rows of a picture with values for each sample, computed by a GPU or the CPU.
 
 use glam::Vec3;
 use std::cell::OnceCell;
@@ -6,12 +6,12 @@ use std::ops::Range;
 use umbrage::{Camera, Plan};
 use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
 
-/// What to say of a picture none of whose pixels counts.
+/// Message about a picture without counted pixels.
 pub const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
      the view's range: there are no shadows to see";
 
-/// Some of a picture's rows, and what the CPU sees there, which is found when it is first asked
-/// for.
+/// Some rows of a picture, and the surfaces that the CPU sees there. Their rays are only traced
+/// when the surfaces are first needed.
 pub struct Rows<'a> {
     view: &'a View<'a>,
     range: Range<u32>,
@@ -20,39 +20,39 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// Rows of a view's picture, counted from the top. `progress` is told of rows of rays.
+    /// Selects rows of a view's picture, counted from the top. `progress` is told of rows of rays.
     pub fn new(view: &'a View<'a>, range: Range<u32>, progress: Progress<'a>) -> Self {
         Self { view, range, progress, band: OnceCell::new() }
     }
 
-    /// Whose picture it is.
+    /// Returns the view that the rows belong to.
     pub(crate) fn view(&self) -> &'a View<'a> {
         self.view
     }
 
-    /// Which rows these are.
+    /// Returns the indices of the rows.
     pub(crate) fn range(&self) -> Range<u32> {
         self.range.clone()
     }
 
-    /// The surfaces that rays find.
+    /// Returns the surfaces that rays hit, tracing the rays at the first call.
     fn band(&self) -> &Band {
         self.band.get_or_init(|| self.view.band(self.range.clone(), self.progress))
     }
 
-    /// The truth.
+    /// Returns the rows with ray-traced shadows, which are the truth.
     pub fn truth(&self) -> Strip {
         let band = self.band();
         Strip::new(self.view, band, band.map(|s| self.view.truth(s), self.progress))
     }
 
-    /// Nothing casts.
+    /// Returns the rows without shadows, as if nothing cast any.
     pub fn in_full_light(&self) -> Strip {
         let band = self.band();
         Strip::new(self.view, band, vec![1.0; band.samples().len()])
     }
 
-    /// What the reference's maps of a plan let through.
+    /// Returns the rows with the shadows of a plan's maps, rendered by the CPU reference.
     pub fn by_reference(&self, plan: &Plan, reference: &Reference<'_>) -> Strip {
         let band = self.band();
         let visibility = band.map(|s| reference.visibility(0, s), self.progress);
@@ -61,31 +61,31 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// What some rows of a picture show, a value a sample, whoever found it: pixel after pixel.
+/// Some rows of a picture with values for each sample, pixel after pixel, from a GPU or the CPU.
 pub struct Strip {
     pub(crate) samples_per_pixel: usize,
     /// Linear colour.
     pub(crate) radiance: Vec<Vec3>,
-    /// 1 in the sky.
+    /// Visibility, 0 (in shadow) to 1 (lit); 1 in the sky.
     pub(crate) visibility: Vec<f32>,
-    /// Whether a surface is seen whose shadow [counts](View::counts).
+    /// Whether the sample shows a surface whose shadow [counts](View::counts).
     counts: Vec<bool>,
-    /// Metres; infinite in the sky.
+    /// Depth, metres; infinite in the sky.
     pub(crate) depth: Vec<f32>,
-    /// World space; zero in the sky.
+    /// Shading normal in world space; zero in the sky.
     pub(crate) normal: Vec<Vec3>,
-    /// Empty for the truth, which has no maps.
+    /// Lookups in shadow maps; empty if the CPU computed the strip without maps.
     pub(crate) lookups: Vec<Lookup>,
 }
 
-/// What a plan has for a sample.
+/// The shadow map and the texel that serve a sample.
 #[derive(Clone, Copy)]
 pub(crate) struct Lookup {
-    /// Pixels per texel in the worst direction; NaN without a map.
+    /// Pixels per texel on the surface in the worst direction; NaN without a map.
     pub(crate) error: f32,
-    /// Coordinates in the map; NaN without one.
+    /// Texel coordinates in the map; NaN without a map.
     pub(crate) texel: [f32; 2],
-    /// Index of the map that serves the sample.
+    /// Index in the plan of the map that serves the sample.
     pub(crate) map: Option<u16>,
 }
 
@@ -128,7 +128,7 @@ impl Strip {
         }
     }
 
-    /// What a GPU drew.
+    /// Makes a strip of samples that a GPU has drawn.
     pub(crate) fn of_gpu(samples: &[umbrage_render::Sample], view: &View<'_>) -> Self {
         type Drawn = umbrage_render::Sample;
         let counts = |s: &Drawn| view.counts(s.is_facing, s.depth.into());
@@ -148,7 +148,7 @@ impl Strip {
         }
     }
 
-    /// For each pixel the mean of a value over the samples that count; `None` where none does.
+    /// Returns each pixel's mean of a value over the samples that count; `None` if none does.
     pub(crate) fn means(&self, value: impl Fn(usize) -> f32) -> impl Iterator<Item = Option<f32>> {
         let n = self.samples_per_pixel;
         self.counts.chunks(n).enumerate().map(move |(pixel, counts)| {
@@ -159,12 +159,12 @@ impl Strip {
         })
     }
 
-    /// Whether each pixel counts: any of its samples does.
+    /// Returns whether each pixel counts, which it does if any of its samples counts.
     pub fn counted(&self) -> impl Iterator<Item = bool> {
         self.counts.chunks(self.samples_per_pixel).map(|counts| counts.contains(&true))
     }
 
-    /// A value of the sample in the middle of each pixel, or next to it.
+    /// Returns a value for each pixel, that of the sample in its middle or next to the middle.
     pub(crate) fn middles<'a, T>(&self, values: &'a [T]) -> impl Iterator<Item = &'a T> {
         let grid = self.samples_per_pixel.isqrt();
         let middle = grid / 2 * grid + grid / 2;

@@ -1,4 +1,4 @@
-//! Comparisons in many views, in shares if there are many, with means over all.
+//! Sweeps: comparisons in many views, which can be split into shares, with means over all views.
 
 mod folder;
 mod merge;
@@ -19,56 +19,60 @@ use std::path::{Path, PathBuf};
 use umbrage_measure::{Sweep, SweepPage, SweepSettings, SweptView, write_sweep};
 use views::SweepView;
 
-/// What to compare in which views.
+/// The views of a sweep, what is compared in them, and where the results go.
 #[derive(Clone, Debug)]
 pub struct SweepOptions {
-    /// A JSON list of views: objects with `name` and `scene`, and what they ask for by the fields'
-    /// names.
+    /// Path of a JSON file that lists the views. Each view is an object with `name`, `scene` and
+    /// any other fields of a view, by their [names](Field::name).
     pub views: PathBuf,
-    /// Folder for the results; a sweep that was begun there goes on.
+    /// Folder for the results. If it already holds a sweep with the same settings, that one goes
+    /// on.
     pub output: PathBuf,
-    /// Folder that the scenes' paths start from; `None`: the folder of `views`.
+    /// Folder that the scenes' paths are relative to; `None` stands for the folder of `views`.
     pub scenes: Option<PathBuf>,
-    /// What to compare, and how finely.
+    /// The techniques to compare, and the number of rays.
     pub comparison: ComparisonOptions,
-    /// The largest error, pixels per texel, that those techniques were given which do not say how
-    /// many texels they have; results tell it.
+    /// Largest error, pixels per texel, that was set for the techniques whose text gives no size
+    /// ([`limit_error`](crate::NamedTechnique::limit_error)). It is recorded with the results.
     pub max_error: Option<f64>,
-    /// What the maps are fitted to.
+    /// What the shadow maps are fitted to.
     pub fit: Fit,
-    /// What renders them.
+    /// The backend that renders the shadow maps.
     pub backend: Backend,
-    /// Alpha-masked materials cast and show as solid.
+    /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
     pub opaque: bool,
-    /// Size of the pictures, pixels, where a view has none of its own.
+    /// Size of the pictures, pixels, for views that give no size of their own.
     pub size: [u32; 2],
-    /// What makes the results again, for people to copy.
+    /// Command that makes the results again. The page shows it for readers to copy.
     pub command: String,
-    /// What to call fields that are not a view's own where it is told why a view failed.
+    /// Returns the caller's words for a field, for messages about failed views. The fields of a
+    /// view keep their [names](Field::name).
     pub words: fn(Field) -> String,
 }
 
-/// One of equal shares of a sweep's views, in their order.
+/// One of the shares that a sweep's views are split into, in their order and in equal numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Which one, from 1.
+    /// Number of this share, from 1.
     pub index: u32,
-    /// Of how many.
+    /// Number of shares.
     pub count: u32,
 }
 
-/// A view that is still to be compared.
+/// A view that is still to be compared, and the folder for its report.
 struct Pending {
     inputs: Inputs,
     place: ReportFolder,
 }
 
-/// Compares what is missing of the views or of a share of them, a part of the job each; then writes
-/// tables and the page of all. What failed is told in the sweep, and tried again next time.
+/// Compares the techniques in those views of the sweep, or of a share of it, that have no valid
+/// report yet. Each view is a part of the job. Then writes the tables and the page. A view that
+/// fails is recorded with the reason, and tried again next time.
 ///
 /// # Errors
-/// A file that holds no views, a folder that holds something else or another sweep, a GPU that is
-/// asked for and not there, and what cannot be written.
+/// An error if the views cannot be read, if `scenes` is not a folder, if the output folder is in
+/// use or holds something else or another sweep, if the GPU that was asked for is missing or cannot
+/// render a technique, or if a file cannot be written.
 pub fn sweep(
     options: &SweepOptions,
     share: Option<Share>,
@@ -86,11 +90,12 @@ pub fn sweep(
     finish(options, share, &folder, views, settings)
 }
 
-/// Takes what there is from the folders of shares, and computes nothing; then writes tables and the
-/// page of all views.
+/// Joins the shares of a sweep: takes the results of the views from the folders of the shares and
+/// computes nothing. Then writes the tables and the page for all views.
 ///
 /// # Errors
-/// As for [`sweep()`]; shares of another sweep, that lack views, or that contradict one another.
+/// The errors of [`sweep()`]. Also an error if a share belongs to another sweep, if a view has no
+/// result, or if the shares contradict one another.
 pub fn join_shares(
     options: &SweepOptions,
     shares: &[PathBuf],
@@ -113,7 +118,7 @@ pub fn join_shares(
     finish(options, None, &folder, views, settings)
 }
 
-/// What every sweep begins with.
+/// The views, executors and settings that every sweep begins with.
 struct Begun {
     views: Vec<SweepView>,
     executors: Executors,
@@ -142,7 +147,7 @@ fn begin(options: &SweepOptions) -> Result<Begun, Error> {
     Ok(Begun { views, executors, settings })
 }
 
-/// Gathers the views' results, and writes tables and page.
+/// Gathers the results of the views, and writes the tables and the page.
 fn finish(
     options: &SweepOptions,
     share: Option<Share>,
@@ -173,8 +178,8 @@ fn finish(
     Ok(sweep)
 }
 
-/// That the folder is not one of other views altogether; says which of its views are no longer
-/// wanted.
+/// Checks that the folder does not only hold views that are missing from the file. Notes each view
+/// of the folder that the file no longer lists.
 fn check_names(
     folder: &SweepFolder,
     options: &SweepOptions,
@@ -197,7 +202,7 @@ fn check_names(
     Ok(())
 }
 
-/// Compares the views that the folder has no result of, one that failed being none.
+/// Compares the techniques in the views without a valid report. A failed view counts as such.
 fn compare_missing(
     options: &SweepOptions,
     executors: &Executors,
@@ -241,7 +246,7 @@ fn compare_missing(
     Ok(())
 }
 
-/// The views that the folder has no result of, and where their results go.
+/// Returns the views that have no valid report in the folder, and where their reports go.
 fn pending(
     scenes: &Path,
     folder: &SweepFolder,
@@ -266,7 +271,7 @@ fn pending(
     Ok(pending)
 }
 
-/// Compares in one view, and keeps the report, or why there is none.
+/// Compares the techniques in one view, and stores the report or the reason for a failure.
 fn compare(
     view: &Pending,
     prepared: Result<&PreparedScene<'_>, &str>,
@@ -299,7 +304,7 @@ fn compare(
     }
 }
 
-/// Why a view failed, in the words of the file that has it.
+/// Returns the reason for a view's failure, with the fields named as in the file of views.
 fn in_words_of_the_file(error: &Error, words: fn(Field) -> String) -> String {
     error.in_words(&|field| match field.is_of_view() {
         true => field.name().to_owned(),

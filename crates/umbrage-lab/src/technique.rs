@@ -1,4 +1,4 @@
-//! Techniques as people write them.
+//! Techniques, and the texts that users write for them.
 
 use crate::error::{Error, Field};
 use std::fmt::{self, Display};
@@ -6,49 +6,49 @@ use std::str::FromStr;
 use umbrage::language::ParseError;
 use umbrage::{Error as PlanError, Size, Technique};
 
-/// The longest side of a shadow map, texels; what today's GPUs allow.
+/// Largest side of a shadow map, texels, which is the limit of today's GPUs.
 pub(crate) const MAX_SIDE: u32 = 16384;
 
-/// A technique, and the text that asked for it. Reports show the text, so that results are found by
-/// what was asked for.
+/// A technique, and the text that describes it. Reports show this text, so that users find the
+/// results by what they asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedTechnique {
     text: String,
     technique: Technique,
 }
 
-/// Why a text names no technique that can be run here.
+/// The reason why a text does not describe a technique that can be run here.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TechniqueError {
-    /// It is none.
+    /// The text does not describe a technique.
     #[error(transparent)]
     Parse(#[from] ParseError),
-    /// It asks for a map that no GPU holds.
+    /// The text asks for a map that no GPU can hold.
     #[error("`@{0}` must have a whole number from 1 to {MAX_SIDE}")]
     TooLarge(Size),
 }
 
 impl NamedTechnique {
-    /// What the text asks for.
+    /// Returns the technique that the text describes.
     pub fn technique(&self) -> &Technique {
         &self.technique
     }
 
-    /// Whether the text says how many texels there are.
+    /// Returns whether the text gives a size: a number of texels or a largest error.
     pub fn is_sized(&self) -> bool {
         self.text.contains('@')
     }
 
-    /// Takes the fewest texels for errors of at most this many pixels per texel, unless the text
-    /// says how many texels there are.
+    /// Makes the planner take the fewest texels with which errors are at most this many pixels per
+    /// texel. Does nothing if the text gives a size.
     pub fn limit_error(&mut self, pixels: f64) {
         if !self.is_sized() {
             self.technique.size = Size::MaxError(pixels);
         }
     }
 
-    /// The planner's complaint about this technique, naming what of the text it is about.
+    /// Converts the planner's error into one that names the part of the text that is to blame.
     pub fn blame(&self, error: PlanError) -> Error {
         let PlanError::Invalid { field, problem } = &error else {
             return Error::Planning(error);
@@ -87,7 +87,7 @@ impl FromStr for NamedTechnique {
     }
 }
 
-/// As it was written.
+/// Shows the text as it was written.
 impl Display for NamedTechnique {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
@@ -117,7 +117,7 @@ mod tests {
         technique.blame(plan.unwrap_err()).to_string()
     }
 
-    /// What the planner refuses names the part of the specification that is to blame.
+    /// The planner's errors name the part of the text that is to blame.
     #[test]
     fn the_planners_complaints_name_the_part() {
         for (text, expected) in [

@@ -1,26 +1,25 @@
-//! Values that people give, each for itself: what is wrong with it, if anything, and what would be
-//! right.
+//! Checks of single values that users give. Each error is a message that says what is valid.
 
 use glam::DVec3;
 
-/// The longest side of a picture, pixels.
+/// Largest width and height of a picture, pixels.
 const MAX_PICTURE_SIDE: u32 = 16384;
-/// The most pixels of a picture: 8192², with which five techniques take some 8 GB to compare.
+/// Largest number of pixels in a picture: 8192². Comparing five techniques takes some 8 GB then.
 const MAX_PICTURE_PIXELS: u64 = 1 << 26;
 
-/// A place in a world, metres.
+/// Checks a position in world space, metres.
 ///
 /// # Errors
-/// One that is not finite, or beyond 10¹² metres from the origin.
+/// An error if a coordinate is not finite, or is more than 10¹² metres from the origin.
 pub fn position(v: DVec3) -> Result<DVec3, String> {
     let is_near = v.is_finite() && v.abs().max_element() <= 1e12;
     if is_near { Ok(v) } else { Err("must be within 1e12 of the origin".to_owned()) }
 }
 
-/// A direction, of any length.
+/// Checks a direction, which may have any length above 0.
 ///
 /// # Errors
-/// One of no length, or that is no [`position`].
+/// An error if the direction has no length, or is not a valid [`position`].
 pub fn pointing(v: DVec3) -> Result<DVec3, String> {
     match position(v)? {
         DVec3::ZERO => Err("must point somewhere, as in -0.5,-1,-0.3".to_owned()),
@@ -28,10 +27,10 @@ pub fn pointing(v: DVec3) -> Result<DVec3, String> {
     }
 }
 
-/// A distance, metres.
+/// Checks a distance, metres.
 ///
 /// # Errors
-/// One that is not above 0 and at most 10¹².
+/// An error if the distance is not above 0 and at most 10¹².
 pub fn metres(d: f64) -> Result<f64, String> {
     if d > 0.0 && d <= 1e12 {
         Ok(d)
@@ -40,10 +39,10 @@ pub fn metres(d: f64) -> Result<f64, String> {
     }
 }
 
-/// A picture's angle, degrees.
+/// Checks a field of view, degrees.
 ///
 /// # Errors
-/// One that is not 0.01 to 179.
+/// An error if the angle is not from 0.01 to 179.
 pub fn opening(degrees: f64) -> Result<f64, String> {
     if (0.01..=179.0).contains(&degrees) {
         Ok(degrees)
@@ -52,10 +51,10 @@ pub fn opening(degrees: f64) -> Result<f64, String> {
     }
 }
 
-/// A picture's width and height, pixels.
+/// Checks the width and height of a picture, pixels.
 ///
 /// # Errors
-/// A side that is not 1 to 16384, or more than 2²⁶ pixels.
+/// An error if a side is not from 1 to 16384, or if there are more than 2²⁶ pixels in all.
 pub fn pixels(size: [u32; 2]) -> Result<[u32; 2], String> {
     if !size.iter().all(|n| (1..=MAX_PICTURE_SIDE).contains(n)) {
         return Err(format!(

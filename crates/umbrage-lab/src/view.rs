@@ -1,4 +1,4 @@
-//! Views: what may be asked for, and what is taken.
+//! Views: the options that a user may give, and the view that follows from them.
 
 use crate::error::{Error, Field};
 use crate::scene::find;
@@ -7,7 +7,7 @@ use glam::DVec3;
 use umbrage::{Aabb, Camera, LookAt};
 use umbrage_scene::{Scene, SceneCamera};
 
-/// What a view has of itself where neither user nor scene says more.
+/// Default values of a view, for what neither the user nor the scene gives.
 const DEFAULT_VIEW: LookAt = LookAt {
     eye: DVec3::ZERO,
     target: DVec3::NEG_Z,
@@ -18,29 +18,29 @@ const DEFAULT_VIEW: LookAt = LookAt {
     image: [960, 540],
 };
 
-/// The view that somebody asks for. What is left out comes from the scene.
+/// The view that a user asks for. Values that are left out come from the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewOptions {
-    /// Position of the viewer, metres; not with a camera.
+    /// Position of the viewer, metres; cannot be combined with `camera`.
     pub eye: Option<DVec3>,
-    /// Point in the middle of the picture, metres; not with a camera.
+    /// Point in the middle of the picture, metres; cannot be combined with `camera`.
     pub target: Option<DVec3>,
-    /// Direction that is up in the picture, of any length; not with a camera.
+    /// Upward direction in the picture, of any length; cannot be combined with `camera`.
     pub up: Option<DVec3>,
     /// Vertical field of view, degrees, 0.01 to 179.
     pub fov_deg: Option<f64>,
-    /// Distance at which the view begins, metres, above 0.
+    /// Near distance of the view, metres, above 0.
     pub near: Option<f64>,
-    /// Distance at which it ends, metres, above `near`.
+    /// Far distance of the view, metres, above `near`.
     pub far: Option<f64>,
-    /// Size of the picture, pixels; 1 to 16384 each way, at most 2²⁶ in all.
+    /// Width and height of the picture, pixels; 1 to 16384 each, at most 2²⁶ pixels in all.
     pub size: [u32; 2],
-    /// A camera of the scene, by name.
+    /// Name of a camera of the scene.
     pub camera: Option<String>,
 }
 
 impl Default for ViewOptions {
-    /// The scene's own view in 960 × 540 pixels.
+    /// The scene's own view, with 960 × 540 pixels.
     fn default() -> Self {
         Self {
             eye: None,
@@ -56,10 +56,10 @@ impl Default for ViewOptions {
 }
 
 impl ViewOptions {
-    /// That each value makes sense, and that they go together.
+    /// Checks each value and their combination.
     ///
     /// # Errors
-    /// The first that does not.
+    /// An error about the first value that is invalid or cannot be combined with another one.
     pub fn check(&self) -> Result<(), Error> {
         fn each<T: Copy>(
             field: Field,
@@ -90,19 +90,19 @@ impl ViewOptions {
     }
 }
 
-/// A view, and where it came from.
+/// A view, and the camera of the scene that it comes from, if any.
 #[derive(Clone, Debug)]
 pub struct ChosenView {
-    /// The camera's name in the scene, if it is from there and was not changed.
+    /// Name of the scene's camera, if the view is that of a camera and was not changed.
     pub name: Option<String>,
-    /// As described.
+    /// The view's eye, target, field of view, depth range and picture size.
     pub look_at: LookAt,
-    /// As planned with.
+    /// The same view in the form that the planner takes.
     pub camera: Camera,
 }
 
 impl ChosenView {
-    /// As reports tell it.
+    /// Returns the view in the form that reports show.
     pub fn info(&self) -> umbrage_measure::View {
         let look_at = &self.look_at;
         umbrage_measure::View {
@@ -117,11 +117,12 @@ impl ChosenView {
     }
 }
 
-/// The view that is asked for. What is left open comes from the scene's camera; a view with an eye
-/// and a target of its own owes the scene only the depth range.
+/// Returns the view that is asked for. Values that are left out come from the scene's camera. If
+/// both the eye and the target are given, only the depth range comes from the scene.
 ///
 /// # Errors
-/// A camera that the scene does not have, or a view that no camera can have.
+/// An error if the scene has no camera of that name, or if the view is not one that a camera can
+/// have.
 pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<ChosenView, Error> {
     let own = match (scene, options.eye, options.target) {
         (None, ..) | (_, Some(_), Some(_)) => None,
@@ -160,15 +161,15 @@ fn scene_camera(options: &ViewOptions, scene: &Scene) -> Result<SceneCamera, Err
     Ok(scene.cameras[index].clone())
 }
 
-/// A depth range for a view from anywhere: up to the end of the scene, from a thousandth of that or
-/// from where the scene begins.
+/// Returns near and far distances for a view from any position. The far distance is where the scene
+/// ends. The near distance is where it begins, but at least a thousandth of the far distance.
 fn depth_range(look_at: &LookAt, bounds: Aabb) -> [f64; 2] {
     let forward = (look_at.target - look_at.eye).normalize_or(DVec3::NEG_Z);
     let far = bounds.corners().iter().map(|&c| forward.dot(c - look_at.eye)).fold(0.0, f64::max);
     let far = if far > 0.0 { far * 1.01 } else { 100.0 };
     let distance = look_at.eye.distance(look_at.eye.clamp(bounds.min, bounds.max));
-    // The scene's nearest point may appear in the picture's corner, where depth is less than
-    // distance.
+    // The scene's nearest point may lie in a corner of the picture, where the depth is less than
+    // the distance.
     let corner = {
         let tan_y = (look_at.fov_y_rad / 2.0).tan();
         let tan_x = tan_y * f64::from(look_at.image[0]) / f64::from(look_at.image[1]);

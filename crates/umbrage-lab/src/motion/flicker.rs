@@ -1,4 +1,4 @@
-//! Shadows that change from frame to frame where the truth does not.
+//! Flicker: shadows that change from frame to frame where the truth does not.
 
 use super::frames::{Frame, Motion, MovingView, executors};
 use crate::error::Error;
@@ -6,17 +6,19 @@ use crate::progress::Progress;
 use crate::technique::NamedTechnique;
 use umbrage_trace::{Sample, View};
 
-/// How much every technique's shadows change, from frame to frame, where the truth does not: the
-/// mean change of visibility, which for hard shadows is the share of points that change. `progress`
-/// hears of as many rows a frame as its picture has.
+/// Measures how much every technique's shadows change from frame to frame where the truth does not:
+/// the mean change of visibility. For hard shadows this is the fraction of points that change.
+/// `progress` is told of as many rows per frame as the picture has.
 ///
-/// What a pixel shows is followed back into the frame before, where it must have been seen as well,
-/// and the truth and the technique are asked there again. So only shadows count that change on a
-/// point of a surface, and not what appears, vanishes or moves across the picture. Compared are
-/// points that face the light in both frames; `None` if there are none.
+/// Each sample is traced back to the frame before. If it was visible there too, its visibility
+/// there is computed again, both the true one and that of the technique. So only those changes of a
+/// shadow count that occur on a point of a surface, and not what appears, vanishes or moves across
+/// the picture. Only points that face the light in both frames are compared; `None` if there are
+/// none.
 ///
 /// # Errors
-/// Frames that do not exist, and what the planner or a GPU refuses.
+/// An error if a frame's view or light is invalid, if the planner refuses a technique, or if a GPU
+/// fails.
 pub fn flicker(
     motion: Motion,
     frames: u32,
@@ -54,8 +56,8 @@ pub fn flicker(
     Ok(change.iter().map(|sum| (compared > 0).then(|| sum / compared as f64)).collect())
 }
 
-/// A sample as it is and as it was in the frame before, if it counts in both and the truth about it
-/// has not changed.
+/// Returns a sample as it is and as it was in the frame before, if it counts in both frames and its
+/// true visibility has not changed.
 fn steady(sample: &Sample, view: &View<'_>, last: &View<'_>) -> Option<[Sample; 2]> {
     let was = last.sees(&sample.surface)?;
     let both_count =

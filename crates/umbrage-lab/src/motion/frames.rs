@@ -1,4 +1,4 @@
-//! Motions, frame by frame.
+//! The frames of a motion.
 
 use crate::error::{About, Error, Field};
 use crate::executor::{Executor, RenderScene};
@@ -8,37 +8,38 @@ use glam::{DQuat, DVec3};
 use umbrage::{Bounds, Camera, Light, LookAt, Plan};
 use umbrage_trace::View;
 
-/// A motion, in steps as small as between the frames of a film.
+/// A motion of the viewer or the light, in steps as small as between the frames of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// The viewer moves forward, by a hundredth of the distance to the target a frame.
+    /// The viewer and the target move forward, by a hundredth of the distance between them per
+    /// frame.
     Dolly,
-    /// The viewer circles the target, half a degree a frame.
+    /// The viewer circles the target, by half a degree per frame.
     Orbit,
-    /// The light turns about the vertical, a tenth of a degree a frame.
+    /// The light turns about the vertical, by a tenth of a degree per frame.
     Sun,
-    /// The viewer moves away from the target, by a two-hundredth of the distance a frame, so that
-    /// more and more texels fall into a pixel.
+    /// The viewer moves away from the target, by a two-hundredth of the first distance per frame,
+    /// so that more and more texels fall into a pixel.
     Away,
 }
 
-/// What moves, through what.
+/// A view and a light in a scene, one of which moves.
 #[derive(Clone, Copy)]
 pub struct MovingView<'a> {
-    /// Where it is rendered.
+    /// The scene that is rendered.
     pub scene: &'a RenderScene<'a>,
-    /// Where the scene's shadows fall.
+    /// Bounds of the scene, which tell the planner where shadows fall.
     pub bounds: &'a Bounds<'a>,
     /// The view of the first frame.
     pub look_at: LookAt,
-    /// Its light.
+    /// The light of the first frame.
     pub light: Light,
     /// Rays along each side of a pixel, 1 to 64.
     pub samples: u32,
 }
 
 impl Motion {
-    /// One word: `dolly`, `orbit`, `sun` or `away`.
+    /// Returns `dolly`, `orbit`, `sun` or `away`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Dolly => "dolly",
@@ -48,15 +49,15 @@ impl Motion {
         }
     }
 
-    /// That all frames of the motion exist.
+    /// Checks that every frame of the motion has a valid view and light.
     ///
     /// # Errors
-    /// A frame's view that no camera can have, or a light that cannot turn.
+    /// An error if a frame's view is not one that a camera can have, or if the light cannot turn.
     pub fn check(self, frames: u32, look_at: LookAt, light: Light) -> Result<(), Error> {
         (0..frames).try_for_each(|i| self.frame(look_at, light, i).map(drop))
     }
 
-    /// View and light of a frame; the first is as told.
+    /// Returns the view and the light of a frame. The first frame has `look_at` and `light`.
     fn frame(self, look_at: LookAt, light: Light, index: u32) -> Result<(Camera, Light), Error> {
         let index = f64::from(index);
         let mut frame = (look_at, light);
@@ -90,14 +91,14 @@ impl Motion {
     }
 }
 
-/// A frame's view, and every technique's plan for it.
+/// The view of a frame, and every technique's plan for it.
 pub(super) struct Frame<'a> {
     pub(super) view: View<'a>,
     pub(super) plans: Vec<Plan>,
 }
 
 impl<'a> Frame<'a> {
-    /// All frames of a motion, pixels having so many rays along each side.
+    /// Returns all frames of a motion, with `samples` rays along each side of a pixel.
     pub(super) fn all(
         motion: Motion,
         frames: u32,
@@ -117,7 +118,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Who renders each technique.
+/// Returns the executors that render the techniques.
 pub(super) fn executors<'a>(
     scene: &'a RenderScene<'_>,
     techniques: &[NamedTechnique],

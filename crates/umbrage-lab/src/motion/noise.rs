@@ -1,4 +1,4 @@
-//! Pixels that sparkle as a scene gets smaller.
+//! Temporal noise: pixels that sparkle as a scene gets smaller in the picture.
 
 use super::frames::{Frame, Motion, MovingView, executors};
 use crate::error::Error;
@@ -7,28 +7,31 @@ use crate::technique::NamedTechnique;
 use std::ops::Range;
 use umbrage_trace::{Sample, View};
 
-/// Rays along each side of a pixel that tell what it ought to show.
+/// Rays along each side of a pixel that determine its true visibility.
 const TRUTH_SAMPLES: u32 = 8;
 
-/// Cosine of the angle up to which surfaces count as one.
+/// Surfaces count as one if the cosine of the angle between their normals is above this value.
 const SAME_PLANE: f64 = 0.99;
 
-/// How much a technique's pixels sparkle.
+/// The temporal noise of a technique, which shows as sparkling pixels.
 #[derive(Clone, Debug)]
 pub struct Noise {
-    /// Of each pixel, the mean over the frames; NaN where it never counts twice in a row.
+    /// Noise of each pixel, the mean over the frames; NaN if it never counts in two successive
+    /// frames.
     pub pixels: Vec<f32>,
-    /// Over all pixels; `None` if none counts.
+    /// Mean over all pixels; `None` if none counts in two successive frames.
     pub mean: Option<f64>,
 }
 
-/// Temporal noise: how much a pixel's error changes from one frame to the next, its visibility at
-/// its centre being compared with the mean of 64 true ones all over it. What is wrong but steady,
-/// as a blur is, does not count. A pixel counts where surfaces that face the light fill it in both
-/// frames. `progress` hears of as many rows a frame as its picture has.
+/// Measures temporal noise: how much a pixel's error changes from one frame to the next. The error
+/// is the difference between the visibility at the pixel's centre and the mean of 64 true ones all
+/// over the pixel. A constant error, such as that of a blur, adds no noise. A pixel counts in a
+/// frame if it is filled by one surface that faces the light. `progress` is told of as many rows
+/// per frame as the picture has.
 ///
 /// # Errors
-/// Frames that do not exist, and what the planner or a GPU refuses.
+/// An error if a frame's view or light is invalid, if the planner refuses a technique, or if a GPU
+/// fails.
 pub fn noise(
     motion: Motion,
     frames: u32,
@@ -62,14 +65,14 @@ pub fn noise(
     Ok(trails.into_iter().map(Trail::noise).collect())
 }
 
-/// What a pixel ought to show, and what is at its centre.
+/// The true visibility of a pixel, and the sample at its centre.
 struct Ideal {
     index: usize,
     truth: f32,
     sample: Sample,
 }
 
-/// The pixels of some rows that count.
+/// Returns the counted pixels of some rows.
 fn ideal(
     view: &View<'_>,
     centers: &View<'_>,
@@ -102,11 +105,11 @@ fn ideal(
         .collect()
 }
 
-/// A technique's errors on the way.
+/// The errors of a technique's pixels in the present and the last frame, and their changes so far.
 struct Trail {
     now: Vec<f32>,
     last: Vec<f32>,
-    /// Sum of the changes, and how many.
+    /// Sum and number of the changes, for each pixel.
     sums: Vec<(f32, u32)>,
 }
 
@@ -116,7 +119,7 @@ impl Trail {
         Self { now: none.clone(), last: none, sums: vec![(0.0, 0); pixels] }
     }
 
-    /// Goes on to the next frame.
+    /// Adds the changes since the last frame, and goes on to the next frame.
     fn step(&mut self) {
         for ((now, last), sum) in self.now.iter_mut().zip(&mut self.last).zip(&mut self.sums) {
             let change = (*now - *last).abs();

@@ -1,14 +1,14 @@
-//! The folder of a sweep. It survives being stopped at any moment.
+//! The folder of a sweep. It stays valid if the process is stopped at any moment.
 //!
 //! ```text
-//! sweep.json          what all views have in common; the first file, so it tells a sweep's folder
-//! .lock               held while a process is at work
-//! views/NAME/         a view's report and `view.json`, which says what it was made from
+//! sweep.json          settings of all views; a folder that has this file is that of a sweep
+//! .lock               locked while a process works in the folder
+//! views/NAME/         a view's report and `view.json`, which records what it was made from
 //! results.csv, results.json, index.html
 //! ```
 //!
-//! A view's folder comes into being by a rename, whole. What was being made when a process died is
-//! left under a name that begins with `.umbrage-`; the next process clears it away.
+//! A view's folder is written under a temporary name and renamed when it is complete. What a
+//! process leaves unfinished has a name that begins with `.umbrage-`; the next process removes it.
 
 use super::views::SweepView;
 use crate::error::{About, Difference, Error, Field};
@@ -19,7 +19,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use umbrage_measure::{Report, SweepSettings, write_file};
 
-/// Figures of another version are no figures of this one.
+/// Version of the program. Results of another version are not valid for this one.
 pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 const SETTINGS: &str = "sweep.json";
@@ -27,47 +27,47 @@ const LOCK: &str = ".lock";
 const VIEWS: &str = "views";
 const TABLES: [&str; 3] = ["index.html", "results.json", "results.csv"];
 
-/// All that a view's figures depend on.
+/// Everything that a view's results depend on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Inputs {
-    /// The program's.
+    /// Version of the program.
     pub(super) version: String,
-    /// Of all views.
+    /// Settings that all views of the sweep share.
     pub(super) settings: SweepSettings,
-    /// The view itself.
+    /// The view in the file of views.
     pub(super) view: SweepView,
-    /// Of the scene's files together; `None` for one that is built in or not there.
+    /// SHA-256 of all files of the scene; `None` if the scene is built in or cannot be read.
     pub(super) scene_sha256: Option<String>,
 }
 
-/// `view.json`.
+/// Contents of `view.json`.
 #[derive(Serialize, Deserialize)]
 struct Record {
     inputs: Inputs,
-    /// Why there is no report.
+    /// Why the view failed; `None` if there is a report.
     error: Option<String>,
 }
 
-/// What is there of a view.
+/// The stored result of a view.
 pub(super) struct Stored {
     pub(super) inputs: Inputs,
-    /// Its report, or why there is none.
+    /// The report, or why the view failed.
     pub(super) outcome: Result<Report, String>,
 }
 
-/// The folder of a sweep that nobody else works in.
+/// The folder of a sweep, locked so that no other process works in it.
 pub(super) struct SweepFolder {
     path: PathBuf,
-    /// Unlocks when closed, however the process ends.
+    /// The lock ends when the file is closed, however the process ends.
     _lock: File,
 }
 
 impl SweepFolder {
-    /// Begins a sweep in a new or empty folder, or goes on with one of the same settings.
+    /// Begins a sweep in a new or empty folder, or continues a sweep with the same settings.
     ///
     /// # Errors
-    /// A folder that holds something else or another sweep, in which another process is at work, or
-    /// that cannot be written.
+    /// An error if the folder holds something else or a sweep with other settings, if another
+    /// process works in it, or if it cannot be written.
     pub(super) fn open(path: &Path, settings: &SweepSettings) -> Result<Self, Error> {
         let wrong = |problem: String| Err(Error::field(Field::Output, problem));
         let shown = path.display();
@@ -97,17 +97,17 @@ impl SweepFolder {
         Ok(Self { path: path.to_owned(), _lock: lock })
     }
 
-    /// Names of the views that are there.
+    /// Returns the names of the views that have a folder.
     pub(super) fn names(&self) -> Result<Vec<String>, Error> {
         names_in(&self.path.join(VIEWS)).about(Field::Output)
     }
 
-    /// What is there of a view; `None` if nothing whole is.
+    /// Returns the stored result of a view; `None` if there is no complete one.
     pub(super) fn stored(&self, name: &str) -> Option<Stored> {
         stored(&self.path, name)
     }
 
-    /// Removes the tables, which are about to be out of date.
+    /// Removes the tables and the page, which are about to be out of date.
     pub(super) fn remove_tables(&self) -> Result<(), Error> {
         for table in TABLES {
             match std::fs::remove_file(self.path.join(table)) {
@@ -121,13 +121,13 @@ impl SweepFolder {
         Ok(())
     }
 
-    /// Where a view's report goes, checked before any work.
+    /// Returns the place for a view's report, after checking that it can be written there.
     pub(super) fn place(&self, name: &str) -> Result<ReportFolder, Error> {
         ReportFolder::check(&view_folder(&self.path, name), Contents::COMPARISON)
     }
 }
 
-/// Writes what a sweep's folder begins with, in place of what others left unfinished.
+/// Removes what other processes left unfinished, and writes the settings and the folder of views.
 fn begin(path: &Path, settings: &SweepSettings) -> io::Result<()> {
     clear(path)?;
     let text = serde_json::to_string_pretty(settings)?;
@@ -138,7 +138,7 @@ fn begin(path: &Path, settings: &SweepSettings) -> io::Result<()> {
     }
 }
 
-/// Removes what others left unfinished.
+/// Removes what other processes left unfinished.
 fn clear(folder: &Path) -> io::Result<()> {
     for name in names_in(folder)?.iter().filter(|n| n.starts_with(TEMPORARY)) {
         let path = folder.join(name);
@@ -147,8 +147,8 @@ fn clear(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Puts a view's result in place, whole: `write` fills a folder with its report, unless there is an
-/// `error`.
+/// Writes a view's result, whole or not at all. `write` fills a folder with the report; it writes
+/// nothing if there is an `error`.
 pub(super) fn put(
     place: &ReportFolder,
     inputs: &Inputs,
@@ -163,17 +163,17 @@ pub(super) fn put(
     })
 }
 
-/// The folder of a view in that of a sweep.
+/// Returns the folder of a view, given that of its sweep.
 pub(super) fn view_folder(sweep: &Path, name: &str) -> PathBuf {
     sweep.join(VIEWS).join(name)
 }
 
-/// The same, as part of an address.
+/// Returns the folder of a view relative to that of its sweep, as part of a URL.
 pub(super) fn relative_view_folder(name: &str) -> String {
     format!("{VIEWS}/{name}")
 }
 
-/// What a sweep's folder has of a view; `None` if nothing whole is there.
+/// Reads the stored result of a view; `None` if there is no complete one.
 pub(super) fn stored(sweep: &Path, name: &str) -> Option<Stored> {
     let folder = view_folder(sweep, name);
     let read = |file: &str| std::fs::read_to_string(folder.join(file)).ok();
@@ -186,10 +186,10 @@ pub(super) fn stored(sweep: &Path, name: &str) -> Option<Stored> {
     Some(Stored { inputs, outcome })
 }
 
-/// The settings of the sweep in a folder that `field` names; `None` if there is none.
+/// Reads the settings of a sweep's folder; `None` if it has none. Errors are about `field`.
 ///
 /// # Errors
-/// Settings that cannot be read.
+/// An error if the settings cannot be read.
 pub(super) fn read_settings(sweep: &Path, field: Field) -> Result<Option<SweepSettings>, Error> {
     let path = sweep.join(SETTINGS);
     let shown = path.display();
@@ -202,7 +202,7 @@ pub(super) fn read_settings(sweep: &Path, field: Field) -> Result<Option<SweepSe
     Ok(Some(settings))
 }
 
-/// That the settings of a folder that `field` names are those `wanted`.
+/// Checks that the settings of a folder are the `wanted` ones. Errors are about `field`.
 pub(super) fn check_same(
     folder: &Path,
     field: Field,
@@ -243,7 +243,7 @@ fn lock(folder: &Path) -> Result<File, Error> {
             );
             return Err(Error::field(Field::Output, problem));
         }
-        // Some network file systems have no locks; whoever starts two there has been told not to.
+        // Some network file systems have no locks; users are told not to start two processes there.
         Err(TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
         locked => locked.about_trying(Field::Output, || format!("cannot lock {shown}"))?,
     }

@@ -1,4 +1,4 @@
-//! Shares of a sweep, joined.
+//! Joins the shares of a sweep.
 
 use super::folder::{self, Stored, VERSION, check_same, stored};
 use super::views::SweepView;
@@ -7,18 +7,19 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use umbrage_measure::SweepSettings;
 
-/// A view's result that is to be taken.
+/// The result of a view, and where it was found.
 pub(super) struct Found {
-    /// The sweep's folder that has it.
+    /// Folder of the sweep that holds the result.
     pub(super) sweep: PathBuf,
     pub(super) stored: Stored,
 }
 
-/// Finds each view's result in `output`, as far as it is there, and in the `shares`. A report goes
-/// before a failure.
+/// Finds each view's result in the `shares` and, as far as it is there, in `output`. A report takes
+/// precedence over a failure.
 ///
 /// # Errors
-/// Shares of another sweep; views that no share has or for which shares differ, all of them listed.
+/// An error if a share is not the folder of this sweep, if a view has no result, or if the shares
+/// contradict one another. It lists all such views and contradictions.
 pub(super) fn find(
     output: &Path,
     shares: &[PathBuf],
@@ -61,19 +62,19 @@ pub(super) fn find(
     }
 }
 
-/// A search for views' results, and what it came across.
+/// A search for the results of views.
 struct Search<'a> {
     output: &'a Path,
     shares: &'a [PathBuf],
     settings: &'a SweepSettings,
-    /// Which sweep saw which content of a scene.
+    /// For each scene, the digest of its files and the first sweep that used them.
     contents: HashMap<&'a str, (String, &'a Path)>,
-    /// Where sweeps contradict one another.
+    /// Contradictions between the sweeps.
     conflicts: Vec<String>,
 }
 
 impl<'a> Search<'a> {
-    /// The result of a view; `None` if nobody has one that fits.
+    /// Returns the result of a view; `None` if no sweep has a valid one.
     fn take(&mut self, view: &'a SweepView) -> Option<Found> {
         let mut taken: Option<Found> = None;
         let sweeps = std::iter::once(self.output).chain(self.shares.iter().map(PathBuf::as_path));
@@ -81,7 +82,7 @@ impl<'a> Search<'a> {
             let Some(stored) = stored(sweep, &view.name) else { continue };
             let is_output = i == 0;
             if let Some(problem) = unfit(&stored, view, self.settings) {
-                // What is out of date in the output itself will be replaced.
+                // Outdated results in the output itself will be replaced.
                 if !is_output {
                     let shown = sweep.display();
                     self.conflicts.push(format!("`{}` of {shown} {problem}", view.name));
@@ -112,7 +113,7 @@ impl<'a> Search<'a> {
         taken
     }
 
-    /// Whether a sweep saw the same files of a view's scene as those before it.
+    /// Returns whether a sweep used the same files of a view's scene as the sweeps before it.
     fn has_same_scene(&mut self, view: &'a SweepView, stored: &Stored, sweep: &'a Path) -> bool {
         let Some(content) = &stored.inputs.scene_sha256 else { return true };
         let (known, first) =
@@ -130,7 +131,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Why a result is not one of this sweep.
+/// Returns why a result does not belong to this sweep; `None` if it does.
 fn unfit(stored: &Stored, view: &SweepView, settings: &SweepSettings) -> Option<String> {
     let inputs = &stored.inputs;
     if inputs.version != VERSION {
@@ -147,7 +148,7 @@ fn unfit(stored: &Stored, view: &SweepView, settings: &SweepSettings) -> Option<
 /// Copies the files of a view's folder.
 ///
 /// # Errors
-/// Files that cannot be read or written.
+/// An error if a file cannot be read or written.
 pub(super) fn copy(from: &Path, to: &Path) -> Result<(), Error> {
     let copy = || -> std::io::Result<()> {
         for entry in std::fs::read_dir(from)? {

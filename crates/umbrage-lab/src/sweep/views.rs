@@ -1,4 +1,4 @@
-//! The file of a sweep's views.
+//! The file that lists the views of a sweep.
 
 use crate::error::{About, Error, Field};
 use crate::light::LightOptions;
@@ -8,16 +8,16 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// The longest name of a view.
+/// Largest number of characters in a view's name.
 const MAX_NAME: usize = 100;
 
-/// One view: what it asks for by the fields' names.
+/// A view in the file. The JSON keys are the [names](Field::name) of the fields.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SweepView {
-    /// Names the view's folder.
+    /// Name of the view, and of the folder for its report.
     pub(super) name: String,
-    /// A file, relative to the scenes' folder, or a built-in scene.
+    /// Path of a file, relative to the folder of scenes, or the name of a built-in scene.
     pub(super) scene: String,
     eye: Option<[f64; 3]>,
     target: Option<[f64; 3]>,
@@ -31,11 +31,11 @@ pub(super) struct SweepView {
     light: Option<String>,
 }
 
-/// Reads the views, whose names fit for folders and differ. Their values are checked by
-/// [`SweepView::options`].
+/// Reads the views, and checks that their names all differ and are valid for folders.
+/// [`SweepView::options`] checks the other values.
 ///
 /// # Errors
-/// A file that cannot be read or holds no such views.
+/// An error if the file cannot be read, or if it is not a list of views with such names.
 pub(super) fn read(path: &Path) -> Result<Vec<SweepView>, Error> {
     let wrong = |problem: String| Err(Error::field(Field::Views, problem));
     let file = path.display();
@@ -51,7 +51,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<SweepView>, Error> {
         if let Err(problem) = check_name(name) {
             return wrong(format!("{file}: the name {name:?}: {problem}"));
         }
-        // Some systems take folders of such names for the same one.
+        // Some systems treat folders as the same if their names differ only in capitals.
         if !names.insert(name.to_ascii_lowercase()) {
             return wrong(format!("{file}: two views are named `{name}` (in capitals or not)"));
         }
@@ -59,7 +59,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<SweepView>, Error> {
     Ok(views)
 }
 
-/// Whether every system has folders of this name; if not, what it must be.
+/// Checks that every system can have a folder of this name. The error says what the name must be.
 fn check_name(name: &str) -> Result<(), String> {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || " -_.,+=@()".contains(c);
     if name.len() > MAX_NAME {
@@ -80,10 +80,10 @@ fn check_name(name: &str) -> Result<(), String> {
 }
 
 impl SweepView {
-    /// What it asks for, checked; `size` where the view has none of its own.
+    /// Checks and returns the options of the view and the light. A view without a size gets `size`.
     ///
     /// # Errors
-    /// A value that makes no sense, or values that do not go together.
+    /// An error if a value is invalid, or if values cannot be combined.
     pub(super) fn options(&self, size: [u32; 2]) -> Result<(ViewOptions, LightOptions), Error> {
         let view = ViewOptions {
             eye: self.eye.map(DVec3::from),
