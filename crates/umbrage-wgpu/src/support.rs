@@ -16,8 +16,8 @@ use wgpu::{
 ///   filters are [`Error::Unsupported`];
 /// - array textures with any number of layers (OpenGL), there is one more layer where 1 or a
 ///   multiple of 6 are needed;
-/// - interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures, the prefilters that
-///   store their statistics in such textures are [`Error::Unsupported`];
+/// - interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures, the prefilters
+///   that store their statistics in such textures are [`Error::Unsupported`];
 /// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
 ///
 /// Fields are public so that you can force a fallback by setting a field to `false`.
