@@ -50,7 +50,7 @@ fn plan(c: &mut Criterion) {
         Aabb::new(corner, corner + cell * DVec3::new(0.8, 0.1 + (i % 7) as f64 / 8.0, 0.8))
     };
     let parts: Vec<Aabb> = (0..256).map(part).collect();
-    let bounds = Bounds { receiver_parts: &parts, ..bounds };
+    let bounds = Bounds { receiver_parts: Some(&tree), ..bounds };
     let mut planner = Planner::new();
     group.bench_function("adaptive, 256 boxes of receivers", |b| {
         b.iter(|| {

@@ -2,7 +2,7 @@
 
 use crate::bounds::Plane;
 use crate::focus::Body;
-use crate::warp::LightSpace;
+use crate::warp::{LightSpace, Seen};
 use glam::{DVec2, DVec3};
 
 /// The largest distance between a plane and the body it bounds, as a share of the body's size.
@@ -10,13 +10,14 @@ const TOUCH: f64 = 1e-6;
 
 /// Appends planes around all that can cast onto `body`, which is the body swept towards the light:
 /// those planes of `around` that touch the body and whose inside lies towards the light, and one
-/// plane through every edge of the body's outline as the light sees it.
+/// plane through every edge of the body's outline as the light sees it. `outline` holds the indices
+/// of its vertices.
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
     around: impl Iterator<Item = Plane>,
     body: &Body,
     space: &LightSpace,
-    outline: &mut Vec<DVec2>,
+    outline: &[u32],
 ) {
     let size = body.size();
     // The planes are moved outwards so that rounding never culls a caster.
@@ -26,14 +27,21 @@ pub(crate) fn caster_planes(
         Some(apex) => plane.distance(apex) >= 0.0,
     };
     let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
-    let touches = |p: &Plane| body.vertices().iter().any(|&v| p.distance(v) <= TOUCH * size);
+    let bounds = body.bounds();
+    let touches = |p: &Plane| {
+        let is_near = |distance: f64| distance <= TOUCH * size;
+        is_near(p.offset + bounds.least_along(p.normal))
+            && body.vertices().iter().any(|&v| is_near(p.distance(v)))
+    };
     planes.extend(around.filter(sweeps_inwards).filter(touches).map(widen));
-    convex_outline(outline, body.vertices().iter().map(|&v| space.project(v).0));
-    for (i, &a) in outline.iter().enumerate() {
-        let b = outline[(i + 1) % outline.len()];
+    let corner = |i: usize| body.vertices()[outline[i % outline.len()] as usize];
+    let mut a = outline.first().map_or(DVec2::ZERO, |_| space.project(corner(0)).0);
+    for i in 0..outline.len() {
+        let b = space.project(corner(i + 1)).0;
         // The line through a and b in the light plane, as a covector over light space's (x, z, w).
         // It is positive on the left of a → b, which is the inside.
         let line = DVec3::new(a.y - b.y, b.x - a.x, a.x * b.y - b.x * a.y);
+        a = b;
         let plane = space.x * line.x + space.z * line.y + space.w * line.z;
         let length = plane.truncate().length();
         if length > 0.0 {
@@ -41,19 +49,48 @@ pub(crate) fn caster_planes(
             let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
             // The direction of an edge as short as rounding is arbitrary. No plane is better than a
             // wrong one.
-            if body.vertices().iter().all(|&v| plane.distance(v) >= 0.0) {
+            if (0..outline.len()).all(|i| plane.distance(corner(i)) >= 0.0) {
                 planes.push(plane);
             }
         }
     }
 }
 
-/// The convex hull of points in the plane, counter-clockwise (Andrew's monotone chain).
-fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
+/// Number of points above which those inside of an octagon are left out first.
+const MANY: usize = 24;
+
+/// Sets the convex hull of points on the light plane, as their indices, counter-clockwise (Andrew's
+/// monotone chain).
+pub(crate) fn convex_outline(hull: &mut Vec<u32>, points: &[Seen]) {
+    let at = |i: u32| points[i as usize].xz;
     hull.clear();
-    hull.extend(points);
-    hull.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    hull.dedup();
+    if points.len() > MANY {
+        // Points inside the octagon of the points farthest in eight directions are not on the hull
+        // (Akl and Toussaint 1978).
+        let ways = OCTAGON.map(|[x, z]| DVec2::new(x, z));
+        let mut farthest = [(f64::NEG_INFINITY, DVec2::ZERO); 8];
+        for p in points {
+            for (far, way) in farthest.iter_mut().zip(ways) {
+                let along = way.dot(p.xz);
+                if along > far.0 {
+                    *far = (along, p.xz);
+                }
+            }
+        }
+        let corners = farthest.map(|(_, corner)| corner);
+        let inside = |p: DVec2| {
+            (0..8).all(|i| {
+                let [a, b] = [corners[i], corners[(i + 1) % 8]];
+                a == b || (b - a).perp_dot(p - a) > 0.0
+            })
+        };
+        hull.extend((0..points.len() as u32).filter(|&i| !inside(at(i))));
+    } else {
+        hull.extend(0..points.len() as u32);
+    }
+    let order = |a: DVec2, b: DVec2| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
+    hull.sort_unstable_by(|&a, &b| order(at(a), at(b)));
+    hull.dedup_by(|a, b| at(*a) == at(*b));
     if hull.len() < 3 {
         return;
     }
@@ -62,15 +99,15 @@ fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
     let mut chain = |indices: &mut dyn Iterator<Item = usize>| {
         let start = hull.len();
         for i in indices {
-            let p = hull[i];
+            let p = at(hull[i]);
             while hull.len() >= start + 2 {
-                let [a, b] = [hull[hull.len() - 2], hull[hull.len() - 1]];
+                let [a, b] = [hull[hull.len() - 2], hull[hull.len() - 1]].map(at);
                 if (b - a).perp_dot(p - a) > 0.0 {
                     break;
                 }
                 hull.pop();
             }
-            hull.push(p);
+            hull.push(hull[i]);
         }
         hull.pop();
     };
@@ -78,3 +115,15 @@ fn convex_outline(hull: &mut Vec<DVec2>, points: impl Iterator<Item = DVec2>) {
     chain(&mut (0..n).rev());
     hull.drain(..n);
 }
+
+/// Eight directions, counter-clockwise.
+const OCTAGON: [[f64; 2]; 8] = [
+    [1.0, 0.0],
+    [1.0, 1.0],
+    [0.0, 1.0],
+    [-1.0, 1.0],
+    [-1.0, 0.0],
+    [-1.0, -1.0],
+    [0.0, -1.0],
+    [1.0, -1.0],
+];

@@ -35,6 +35,7 @@
 pub mod aliasing;
 mod atlas;
 mod bounds;
+mod box_tree;
 mod camera;
 mod casters;
 mod error;
@@ -56,6 +57,7 @@ mod worst;
 
 pub use atlas::{Atlas, AtlasTooLarge, Place, ScaleOffset};
 pub use bounds::{Aabb, Bounds, Plane};
+pub use box_tree::BoxTree;
 pub use camera::{Camera, ClipDepth, LookAt};
 pub use error::Error;
 pub use light::{Light, PointLight, SpotLight};

@@ -3,7 +3,7 @@
 use crate::math::range;
 use crate::plan::ShadowMap;
 use crate::warp::{LightSpace, Seen};
-use glam::{DMat3, DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 /// Scales and shifts a homography's s and t so that the points seen fill [0, 1]², and scales w so
 /// that its least value is 1. `None` if w is not positive everywhere, which rounding can cause
@@ -95,10 +95,10 @@ impl ShadowMap {
     }
 }
 
-/// λ: the distance of the points seen from the line on which the homography's w vanishes. `None`
-/// if w is constant.
-pub(crate) fn lambda(homography: DMat3, seen: &[Seen]) -> Option<f64> {
+/// λ: the distance of the points seen, given by their outline, from the line on which the
+/// homography's w vanishes. `None` if w is constant.
+pub(crate) fn lambda(homography: DMat3, outline: &[DVec2]) -> Option<f64> {
     let w = homography.row(2);
-    let (lo, hi) = range(seen.iter().map(|p| w.dot(p.xz.extend(1.0))));
+    let (lo, hi) = range(outline.iter().map(|p| w.dot(p.extend(1.0))));
     (hi > lo * (1.0 + 1e-9)).then(|| lo / w.truncate().length())
 }

@@ -1,7 +1,7 @@
 use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::focus::Body;
+use crate::focus::{Body, frustum_planes, sides};
 use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
@@ -11,10 +11,12 @@ use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
 use draft::{Draft, Drafting};
 use finish::{FinishRequest, Finishing};
+use opening::Opening;
 use slices::Slicing;
 
 mod draft;
 mod finish;
+mod opening;
 mod slices;
 
 /// Plans shadow maps. Keep one planner for each view: it reuses its buffers, so that planning
@@ -66,6 +68,7 @@ pub struct Planner {
     units: Vec<[f64; 2]>,
     sizes: Vec<[u32; 2]>,
     bodies: Bodies,
+    opening: Opening,
     /// Planes around everything that the camera sees.
     around: Vec<Plane>,
     /// Planes around the part of a light's view that a face of the frustum serves.
@@ -80,12 +83,10 @@ pub struct Planner {
 struct Bodies {
     /// The receivers that the camera sees.
     view: Body,
-    /// Those within one projector's light.
+    /// Those within one pyramid of light; not used under parallel light.
     lit: Body,
     /// Those that a face of the frustum serves.
     face: Body,
-    /// One box of receivers, before it joins the others.
-    part: Body,
 }
 
 /// Checked input for the maps of one projector.
@@ -97,6 +98,11 @@ struct Request<'a> {
 }
 
 impl Planner {
+    /// The largest number of parts that the receivers of a view are divided into. Boxes of a
+    /// [`BoxTree`](crate::BoxTree) beyond this number are served in groups, each by the box around
+    /// it.
+    pub const MOST_PARTS: usize = 32;
+
     /// A planner with empty buffers and default [`Limits`], which every WebGPU device supports.
     pub fn new() -> Self {
         Self::default()
@@ -161,32 +167,26 @@ impl Planner {
 
     /// Finds the body of the receivers that the camera sees.
     fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
-        // `lit` is not in use yet; it holds the whole view while `view` is put together from boxes.
-        let Bodies { view, lit: whole, part, .. } = &mut self.bodies;
+        let view = &mut self.bodies.view;
         let local = |aabb: Aabb| aabb.relative_to(camera.eye());
         view.set_frustum(camera);
         self.around.clear();
-        self.around.extend(view.planes());
+        self.around.extend(frustum_planes(camera));
         if let Some(receivers) = bounds.receivers {
-            self.around.extend(view.sides(local(receivers)));
-            view.clip_aabb(local(receivers));
-        }
-        if !bounds.receiver_parts.is_empty() {
-            whole.copy_from(view);
-            view.clear();
-            let seen = Aabb::around(whole.vertices().iter().copied());
-            for &aabb in bounds.receiver_parts {
-                // Vertices cut out of a vast box would lose as many digits as the box's size takes
-                // up, so the box is first intersected with what is seen.
-                let aabb = local(aabb).intersection(seen);
-                let sides = whole.sides(aabb);
-                let may_be_seen = |p: &Plane| p.may_touch(aabb);
-                if !aabb.is_empty() && self.around.iter().all(may_be_seen) {
-                    part.set_box(sides);
-                    self.around.iter().for_each(|&p| part.clip(p));
-                    view.append(part);
-                }
+            let sides = view.sides(local(receivers));
+            self.around.extend(sides);
+            if receivers.is_empty() {
+                view.clear();
             }
+            view.clip(&sides);
+        }
+        if let Some(tree) = bounds.receiver_parts {
+            let seen = view.bounds();
+            self.opening.choose(tree, camera, &self.around, seen, Self::MOST_PARTS);
+            let size = view.size();
+            view.clear();
+            self.opening.boxes().for_each(|aabb| view.push_box(sides(aabb, size)));
+            view.clip(&self.around);
         }
     }
 
@@ -195,17 +195,19 @@ impl Planner {
         let Request { camera, projector, technique, .. } = *request;
         let Bodies { view, lit, .. } = &mut self.bodies;
         let pyramid = projector.frustum(camera.eye(), view.size());
-        lit.copy_from(view);
-        pyramid.into_iter().flatten().for_each(|plane| lit.clip(plane));
+        if let Some(planes) = &pyramid {
+            lit.set_clipped(view, planes);
+        }
         let with_near = technique.partition.faces == Faces::SidesAndNear;
         let faces = partition::LitFaces::new(camera, projector, with_near);
         for &face in technique.partition.face_list() {
             self.cell.clear();
             let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
-            let Bodies { lit, face: body, .. } = &mut self.bodies;
-            body.copy_from(lit);
-            self.cell.iter().for_each(|&plane| body.clip(plane));
-            if !has_part {
+            let Bodies { view, lit, face: body } = &mut self.bodies;
+            let lit = if pyramid.is_some() { &*lit } else { &*view };
+            if has_part {
+                body.set_clipped(lit, &self.cell);
+            } else {
                 body.clear();
             }
             self.cell.extend(pyramid.into_iter().flatten());
@@ -218,8 +220,9 @@ impl Planner {
     /// light.
     fn theta(&self, light: &Light, camera: &Camera) -> f64 {
         let Bodies { view, lit, .. } = &self.bodies;
-        let seen = if matches!(light, Light::Point(_)) { view } else { lit };
-        theta(light, camera, seen.middle().unwrap_or(camera.forward() * camera.near()))
+        let seen = if matches!(light, Light::Spot(_)) { lit } else { view };
+        let middle = if seen.is_empty() { camera.forward() * camera.near() } else { seen.middle() };
+        theta(light, camera, middle)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::light::Projector;
 use crate::matrices::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::plan::ShadowMap;
 use crate::slab::along_axis;
-use crate::warp::LightSpace;
+use crate::warp::{LightSpace, Shape};
 use glam::{DMat3, DVec3, DVec4};
 
 /// The placement of a stable map. Its texels keep their positions and their size in the world,
@@ -48,6 +48,13 @@ impl Stable {
         [self.unit_error; 2]
     }
 
+    /// The shape of a map of this resolution; `None` in a pyramid of light.
+    pub(crate) fn shape(&self, resolution: [u32; 2]) -> Option<Shape> {
+        let Region::Sphere { radius, .. } = self.region else { return None };
+        let texel = texels(radius, resolution);
+        Some(Shape::even([0, 1].map(|i| texel[i] * f64::from(resolution[i]))))
+    }
+
     /// Sets a map's matrices for the resolution that it has. Returns the distance by which the map
     /// has to begin before depth 0, as a share of its range of depths.
     pub(crate) fn place(&self, map: &mut ShadowMap) -> f64 {
@@ -57,9 +64,7 @@ impl Stable {
                 ([0.0; 2], [2.0 * slope; 2], depth)
             }
             Region::Sphere { center, radius } => {
-                // The map is one texel wider than the sphere, and so can move by up to half a texel
-                // each way.
-                let texel = map.resolution.map(|n| 2.0 * radius / f64::from(n - 1));
+                let texel = texels(radius, map.resolution);
                 let width = [0, 1].map(|i| texel[i] * f64::from(map.resolution[i]));
                 // The grid's origin is the world's origin, but positions are relative to the eye
                 // and small, so that far from the world's origin no digits are lost beyond those
@@ -93,6 +98,12 @@ impl Stable {
             }
         }
     }
+}
+
+/// Widths in s and t of the texels around a sphere. The map is one texel wider than the sphere, and
+/// so can move by up to half a texel each way.
+fn texels(radius: f64, resolution: [u32; 2]) -> [f64; 2] {
+    resolution.map(|n| 2.0 * radius / f64::from(n - 1))
 }
 
 /// The bounding sphere of the part of the view frustum from `near` to `far`: centre (local space)

@@ -21,6 +21,7 @@ use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::Body;
 use crate::plan::{MapError, Rows, ShadowMap};
+use crate::warp::{Seen, Shape};
 use glam::DVec3;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -84,6 +85,21 @@ pub(crate) struct Buffers {
     corners: Vec<Corner>,
     /// Simplices whose bound exceeds the largest error found by more than the tolerance.
     open: BinaryHeap<Simplex>,
+    points: Vec<Point>,
+    /// Parts of a cell's edges that may hold the largest error.
+    segments: Vec<[Point; 2]>,
+}
+
+/// A point of a body as a one-point map under parallel light sees it.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    /// Distance of light-space x from the axis of the perspective.
+    off_axis: f64,
+    w: f64,
+    z: f64,
+    w_over_z: f64,
+    /// Error in the worst direction, metres per texel over view depth.
+    error: f64,
 }
 
 /// The largest errors of `map` over `body` (local space), pixels per texel: never less than the
@@ -94,7 +110,7 @@ pub(crate) fn worst_errors(
     camera: &Camera,
     buffers: &mut Buffers,
 ) -> MapError {
-    let Buffers { corners, open } = buffers;
+    let Buffers { corners, open, .. } = buffers;
     let probe = Probe { map, camera };
     corners.clear();
     corners.extend(body.vertices().iter().filter_map(|&v| probe.corner(v)));
@@ -103,10 +119,18 @@ pub(crate) fn worst_errors(
     let mut search = Search { probe, corners, open, best, settled: best };
     // If a body is smaller than the rounding of its position, the map may not apply at its corners.
     if search.corners.len() == body.vertices().len() {
-        if search.probe.edges_suffice() {
-            body.edges().for_each(|[a, b]| search.add([a, b, b].map(|i| i as u32)));
-        } else {
-            body.triangles().for_each(|t| search.add(t.map(|i| i as u32)));
+        let edges_suffice = search.probe.edges_suffice();
+        for cell in body.cells() {
+            // The bounds hold for the convex hull of any number of corners.
+            let whole = search.probe.bound(&search.corners[cell.vertices()]);
+            if (0..3).all(|i| whole[i] <= search.best[i]) {
+                continue;
+            }
+            if edges_suffice {
+                cell.edges().for_each(|[a, b]| search.add([a, b, b].map(|i| i as u32)));
+            } else {
+                cell.triangles().for_each(|t| search.add(t.map(|i| i as u32)));
+            }
         }
         for _ in 0..MAX_SPLITS {
             let Some(most_urgent) = search.open.pop() else { break };
@@ -123,6 +147,79 @@ pub(crate) fn worst_errors(
     let pixel = camera.pixel_width_per_depth();
     let [max_s, max_t, max] = larger(search.best, bounds).map(|e| e / pixel);
     MapError { max_s, max_t, max }
+}
+
+/// The largest errors of a one-point map under parallel light, given by its shape, over a body whose
+/// vertices are at `seen` in light space. As those of [`worst_errors`], which takes longer.
+///
+/// m_s = w/z and m_t = w²/z, up to factors, are largest at vertices. The error in the worst
+/// direction is w/z times the norm of a matrix that is affine in x and z. Both factors are largest
+/// at vertices, and their product on an edge.
+pub(crate) fn worst_of_shape(
+    shape: &Shape,
+    resolution: [u32; 2],
+    body: &Body,
+    seen: &[Seen],
+    camera: &Camera,
+    buffers: &mut Buffers,
+) -> MapError {
+    let resolution = resolution.map(f64::from);
+    let Buffers { points, segments, .. } = buffers;
+    let mut most = [0f64; 2];
+    points.clear();
+    points.extend(seen.iter().map(|p| {
+        let w = shape.w(p.xz.y);
+        let w_over_z = w / p.depth;
+        most = [most[0].max(w_over_z), most[1].max(w_over_z * w)];
+        Point { off_axis: shape.off_axis(p.xz.x), w, z: p.depth, w_over_z, error: 0.0 }
+    }));
+    let norm = |w: f64, off_axis: f64| shape.texel_over_w(w, off_axis, resolution).longest();
+    let texel = shape.texel_over_w(1.0, 0.0, resolution);
+    let pixel = camera.pixel_width_per_depth();
+    let error = |max: f64| MapError {
+        max_s: most[0] * texel.base / pixel,
+        max_t: most[1] * texel.height / pixel,
+        max: max / pixel,
+    };
+    if shape.is_even() {
+        return error(most[0] * norm(1.0, 0.0));
+    }
+    let mut best = 0f64;
+    for p in &mut *points {
+        p.error = p.w_over_z * norm(p.w, p.off_axis);
+        best = best.max(p.error);
+    }
+    let mut settled = best;
+    let mut splits = MAX_SPLITS;
+    for cell in body.cells() {
+        let corners = &points[cell.vertices()];
+        let most = |of: &dyn Fn(&Point) -> f64| corners.iter().map(of).fold(0.0, f64::max);
+        let bound = most(&|p| p.w_over_z) * norm(most(&|p| p.w), most(&|p| p.off_axis.abs()));
+        if bound <= best {
+            continue;
+        }
+        segments.clear();
+        segments.extend(cell.edges().map(|ends| ends.map(|i| points[i])));
+        while let Some([a, b]) = segments.pop() {
+            let over_w = |p: &Point| p.error / p.w_over_z;
+            let bound = (a.w_over_z.max(b.w_over_z) * over_w(&a).max(over_w(&b)))
+                .min(a.w.max(b.w) * (a.error / a.w).max(b.error / b.w));
+            if bound <= best * (1.0 + TOLERANCE) || splits == 0 {
+                settled = settled.max(if bound.is_finite() { bound } else { 0.0 });
+                continue;
+            }
+            splits -= 1;
+            // Halving at the middle of 1/z gives both halves similar ranges of z.
+            let share = a.z / (a.z + b.z);
+            let [off_axis, w, z] =
+                [(a.off_axis, b.off_axis), (a.w, b.w), (a.z, b.z)].map(|(a, b)| a + (b - a) * share);
+            let mut middle = Point { off_axis, w, z, w_over_z: w / z, error: 0.0 };
+            middle.error = middle.w_over_z * norm(w, off_axis);
+            best = best.max(middle.error);
+            segments.extend([[a, middle], [middle, b]]);
+        }
+    }
+    error(settled.max(best))
 }
 
 fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -220,8 +317,8 @@ impl Probe<'_> {
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
     }
 
-    /// Upper bounds over a simplex of the errors in s, in t and in the worst direction.
-    fn bound(&self, corners: &[Corner; 3]) -> [f64; 3] {
+    /// Upper bounds over the convex hull of some corners of the errors in s, in t and in the worst direction.
+    fn bound(&self, corners: &[Corner]) -> [f64; 3] {
         let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
         let w_over_z = max(&|c| c.w / c.z);
         // m_t = w²/|N|, where N = w² ∇t is affine. |N| is at least its component along any

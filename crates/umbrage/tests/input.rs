@@ -6,7 +6,7 @@ use common::{STABLE, WARPS, map_count, planner, possible, technique};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
-    Aabb, Bounds, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt, Partition, Plan,
+    Aabb, BoxTree, Bounds, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt, Partition, Plan,
     Planner, PointLight, Size, Splits, SpotLight, Technique, Warp,
 };
 
@@ -102,10 +102,13 @@ fn lights_and_bounds_name_what_is_wrong() {
     let nan = Aabb { min: DVec3::ZERO, max: DVec3::NAN };
     for (bounds, expected) in [
         (Bounds { receivers: Some(upside_down), ..none }, "bounds.receivers"),
-        (Bounds { receiver_parts: &[Aabb::EMPTY, nan], ..none }, "bounds.receiver_parts"),
         (Bounds { casters: Some(nan), ..none }, "bounds.casters"),
     ] {
         assert_eq!(plan(SUN, &bounds), expected);
+    }
+    for wrong in [nan, upside_down] {
+        let error = BoxTree::new(&[Aabb::EMPTY, wrong]).unwrap_err();
+        assert!(error.to_string().contains("boxes"), "{error}");
     }
 }
 

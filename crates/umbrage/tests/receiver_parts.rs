@@ -6,7 +6,7 @@ mod common;
 use common::{Config, WARPS, config, partition, planner, possible, technique};
 use glam::DVec3;
 use proptest::prelude::*;
-use umbrage::{Aabb, Bounds, Faces, Light, Partition, Plan, Splits, Technique, Warp};
+use umbrage::{Aabb, Bounds, BoxTree, Faces, Light, Partition, Plan, Splits, Technique, Warp};
 
 /// Boxes among a configuration's receivers, or in its view if it has none. Some are flat, some
 /// empty, some repeated and some out of sight. They are described by numbers that apply to any
@@ -74,6 +74,10 @@ fn seen_points(config: &Config, parts: &[Aabb], numbers: &[[f64; 3]]) -> Vec<DVe
     points.filter(|&p| config.sees(p)).collect()
 }
 
+fn tree(parts: &[Aabb]) -> BoxTree {
+    BoxTree::new(parts).unwrap()
+}
+
 fn plan(config: &Config, bounds: &Bounds<'_>, technique: &Technique) -> Plan {
     planner().plan(&config.camera, &[config.light], bounds, technique).unwrap().clone()
 }
@@ -102,7 +106,7 @@ proptest! {
         let (name, spread) = WARPS[pick];
         let partition = possible(partition, spread);
         let parts = parts(&config, &boxes);
-        let bounds = Bounds { receiver_parts: &parts, ..config.bounds };
+        let bounds = Bounds { receiver_parts: Some(&tree(&parts)), ..config.bounds };
         let plan = plan(&config, &bounds, &Technique { partition, ..technique(spread) });
         for map in &plan.maps {
             let errors = [map.error.max_s, map.error.max_t, map.error.max];
@@ -157,7 +161,7 @@ proptest! {
         prop_assume!(!all.is_empty());
         let storage = |bounds: Bounds<'_>| plan(&config, &bounds, &technique(Warp::Uniform)).storage_factor();
         let one = storage(Bounds { receivers: Some(all), ..config.bounds });
-        let many = storage(Bounds { receiver_parts: &parts, ..config.bounds });
+        let many = storage(Bounds { receiver_parts: Some(&tree(&parts)), ..config.bounds });
         prop_assert!(many <= one * 1.01, "{many} > {one}");
     }
 
@@ -184,7 +188,7 @@ proptest! {
         let larger = if is_flat { f64::max(larger, 1.0) } else { larger };
         let part = [Aabb { min: all.min - larger, max: all.max + larger }];
         let expected = plan(&config, &config.bounds, &technique);
-        let found = plan(&config, &Bounds { receiver_parts: &part, ..config.bounds }, &technique);
+        let found = plan(&config, &Bounds { receiver_parts: Some(&tree(&part)), ..config.bounds }, &technique);
         let tolerance = match spread.warp {
             // The strength may lie anywhere near the minimum, which is flat.
             Warp::Adaptive(_) => 1e-5,

@@ -3,22 +3,31 @@
 use super::Request;
 use crate::aliasing::Local;
 use crate::camera::Camera;
+use crate::casters::convex_outline;
 use crate::focus::Body;
+use crate::math::range;
 use crate::matrices::{DepthRange, filling_unit_square, lambda, matrices};
 use crate::partition::Along;
 use crate::plan::{MapError, Part, Rows, ShadowMap, Slab};
 use crate::slab::along_axis;
 use crate::stable::{Stable, bounding_sphere};
 use crate::technique::{Cover, Objective, Warp};
-use crate::warp::{LightSpace, OnePoint, Seen, psm};
+use crate::warp::{LightSpace, OnePoint, Search, Seen, Shape, View, psm};
 use crate::worst::{self, worst_errors};
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// What the planner knows about a map besides the map itself.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Draft {
     /// The receivers that the map serves.
     pub(super) body: Body,
+    /// The body's vertices in light space, in the same order.
+    pub(super) seen: Vec<Seen>,
+    /// Indices of the vertices on the body's outline as the light sees it, counter-clockwise.
+    pub(super) outline: Vec<u32>,
+    /// The map's shape on the light plane, if it is a one-point map with even rows under parallel
+    /// light. Its errors follow from the shape and the points seen.
+    pub(super) shape: Option<Shape>,
     /// The placement of a stable map, whose matrices do depend on its resolution.
     pub(super) stable: Option<Stable>,
 }
@@ -26,98 +35,177 @@ pub(super) struct Draft {
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drafting {
-    seen: Vec<Seen>,
-    /// The points that a map over the whole scene covers, in light space.
+    /// The points that a map covers, in light space, where these are more than the body's vertices.
     covered: Vec<Seen>,
+    /// Light-space x and z of the outline of the points covered.
+    outline: Vec<DVec2>,
+    hull: Vec<u32>,
+    search: Search,
     worst: worst::Buffers,
+}
+
+/// A part of the view on the light plane, and the warp chosen for it.
+struct Chosen {
+    space: LightSpace,
+    family: OnePoint,
+    nu: f64,
+}
+
+/// The largest number of cells in a body whose edges are sampled under a lamp.
+const FEW_CELLS: usize = 4;
+
+impl Draft {
+    /// Sets what the light sees of the body.
+    pub(super) fn see(&mut self, space: &LightSpace, camera: &Camera) {
+        self.seen.clear();
+        self.seen.extend(self.body.vertices().iter().map(|&v| Seen::new(v, space, camera)));
+        convex_outline(&mut self.outline, &self.seen);
+    }
+
+    /// The least and the largest w of a one-point map over the points seen.
+    pub(super) fn range_of_w(&self, shape: &Shape) -> [f64; 2] {
+        range(self.outline.iter().map(|&i| shape.w(self.seen[i as usize].xz.y))).into()
+    }
 }
 
 impl Drafting {
     /// Sets everything of a map that does not depend on its resolution. Returns its largest errors
-    /// in s and t if it had one texel, pixels per texel, or 0 if it serves no receivers. If
-    /// `is_trial` is set, the map may be slightly worse.
+    /// in s and t if it had one texel, pixels per texel, or 0 if it serves no receivers.
     pub(super) fn draft(
         &mut self,
         map: &mut ShadowMap,
-        body: &Body,
+        draft: &mut Draft,
         along: &Along,
         warp: Warp,
-        is_trial: bool,
         request: &Request<'_>,
     ) -> [f64; 2] {
-        let Request { camera, projector, technique, .. } = *request;
-        let Some(middle) = body.middle() else { return [0.0; 2] };
-        let covers_scene = technique.cover == Cover::Scene;
-        let space = &match along {
-            _ if covers_scene => LightSpace::fixed(projector, camera),
-            Along::View => LightSpace::following_view(projector, camera, middle),
-            Along::Side(side) => LightSpace::following_face(projector, camera, side, middle),
+        let Some(Chosen { space, family, nu }) = self.choose(draft, along, warp, request) else {
+            return [0.0; 2];
         };
-        let Self { seen, covered, worst, .. } = self;
-        let see = |p: DVec3| Seen::new(p, space, camera);
-        seen.clear();
-        seen.extend(body.vertices().iter().map(|&v| see(v)));
-        if space.apex.is_some() {
-            // Under a spot light, errors need not be largest at vertices. These additional points
-            // on edges suffice to choose a warp; the errors reported do not depend on them.
-            let vertices = body.vertices();
-            seen.extend(body.edges().flat_map(|[a, b]| {
-                [0.25, 0.5, 0.75].map(|k| see(vertices[a].lerp(vertices[b], k)))
-            }));
-        }
-        let seen = &*seen;
-        // A map over the whole scene also covers the points seen, because flat bounds of receivers
-        // were thickened a little.
-        let covered: &[Seen] = if covers_scene {
-            covered.clear();
-            covered.extend(request.whole_scene(space).map(see));
-            covered.extend_from_slice(seen);
-            covered
-        } else {
-            seen
-        };
-
-        let family = OnePoint::around(covered, space);
-        let general = match warp {
-            Warp::Psm => {
-                psm(space, camera, body.vertices()).and_then(|h| filling_unit_square(h, covered))
-            }
-            _ => None,
-        };
+        let camera = request.camera;
+        let Self { covered, outline, worst, .. } = self;
+        let Draft { body, seen, shape, .. } = draft;
         // The errors of a map of one texel determine the resolution.
         map.resolution = [1, 1];
         map.apex = space.apex;
-        map.slab = along_axis(space);
+        map.slab = along_axis(&space);
         let set = |map: &mut ShadowMap, homography: DMat3| {
-            let depth = DepthRange::of(covered, homography, space);
-            [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, space);
-            map.lambda = lambda(homography, seen);
+            let depth = DepthRange::of(covered, homography, &space);
+            [map.shadow_from_local, map.local_from_shadow] = matrices(homography, depth, &space);
+            map.lambda = lambda(homography, outline);
         };
-        if let Some(homography) = general {
-            set(map, homography);
-            return unit_errors(map, body, camera);
+        if warp == Warp::Psm {
+            let general = psm(&space, camera, body.vertices());
+            if let Some(homography) = general.and_then(|h| filling_unit_square(h, covered)) {
+                set(map, homography);
+                return unit_errors(map, body, camera);
+            }
         }
-        let nu = family.strength(warp, covered, space, camera);
         if warp == Warp::Log && nu > 1e-9 {
             map.rows = Rows::Logarithmic { ratio: 1.0 + nu };
         }
+        let chosen = family.shape(nu, outline);
+        set(map, chosen.homography());
+        if space.apex.is_none() && map.rows == Rows::Even {
+            *shape = Some(chosen);
+            return shape_errors(&chosen, seen, camera);
+        }
         // Under a spot light `adaptive` chooses a warp from sample points. A comparison of the true
-        // errors ensures that it is never worse than `uniform`. For trials this takes too long.
-        let is_checked = !is_trial && space.apex.is_some() && nu > 0.0;
-        if warp == Warp::Adaptive(Objective::Storage) && is_checked {
-            let mut storage = |nu: f64| {
-                set(map, family.homography(nu, covered));
+        // errors ensures that it is never worse than `uniform`.
+        if warp == Warp::Adaptive(Objective::Storage) && nu > 0.0 {
+            let mut storage = |map: &ShadowMap| {
                 let error = worst_errors(map, body, camera, worst);
                 error.max_s * error.max_t
             };
-            if storage(0.0) <= storage(nu) {
-                set(map, family.homography(0.0, covered));
+            let warped = storage(map);
+            set(map, family.shape(0.0, outline).homography());
+            if storage(map) > warped {
+                set(map, chosen.homography());
             }
-        } else {
-            set(map, family.homography(nu, covered));
         }
         unit_errors(map, body, camera)
     }
+
+    /// The number of texels, up to a factor common to all slices of a part, that a map of the
+    /// draft's body needs for a given error. It costs less than [`draft`](Self::draft).
+    pub(super) fn storage(
+        &mut self,
+        draft: &mut Draft,
+        along: &Along,
+        warp: Warp,
+        request: &Request<'_>,
+    ) -> f64 {
+        let Some(Chosen { family, nu, .. }) = self.choose(draft, along, warp, request) else {
+            return 0.0;
+        };
+        let [s, t] = shape_errors(&family.shape(nu, &self.outline), &draft.seen, request.camera);
+        s * t
+    }
+
+    /// Looks at a body from the light and chooses the strength of its warp; `None` if the body is
+    /// empty.
+    fn choose(
+        &mut self,
+        draft: &mut Draft,
+        along: &Along,
+        warp: Warp,
+        request: &Request<'_>,
+    ) -> Option<Chosen> {
+        let Request { camera, projector, technique, .. } = *request;
+        if draft.body.is_empty() {
+            draft.seen.clear();
+            draft.outline.clear();
+            return None;
+        }
+        let covers_scene = technique.cover == Cover::Scene;
+        let space = match along {
+            _ if covers_scene => LightSpace::fixed(projector, camera),
+            Along::View => LightSpace::following_view(projector, camera, draft.body.middle()),
+            Along::Side(side) => {
+                LightSpace::following_face(projector, camera, side, draft.body.middle())
+            }
+        };
+        draft.see(&space, camera);
+        let Self { covered, outline, hull, search, .. } = self;
+        let see = |p: DVec3| Seen::new(p, &space, camera);
+        covered.clear();
+        covered.extend_from_slice(&draft.seen);
+        outline.clear();
+        if covers_scene {
+            // A map over the whole scene also covers the points seen, because flat bounds of
+            // receivers were thickened a little.
+            covered.extend(request.whole_scene(&space).map(see));
+            convex_outline(hull, covered);
+            outline.extend(hull.iter().map(|&i| covered[i as usize].xz));
+        } else {
+            outline.extend(draft.outline.iter().map(|&i| draft.seen[i as usize].xz));
+            if space.apex.is_some() && draft.body.cells().count() <= FEW_CELLS {
+                // Under a spot light, errors need not be largest at vertices. These additional
+                // points on edges suffice to choose a warp; the errors reported do not depend on
+                // them. Where there are many cells, their vertices lie close enough.
+                let vertices = draft.body.vertices();
+                covered.extend(draft.body.cells().flat_map(|c| c.edges()).flat_map(|[a, b]| {
+                    [0.25, 0.5, 0.75].map(|k| see(vertices[a].lerp(vertices[b], k)))
+                }));
+            }
+        }
+        let view = View { seen: covered, outline };
+        let family = OnePoint::around(&view, &space);
+        let nu = family.strength(warp, &view, &space, camera, search);
+        Some(Chosen { space, family, nu })
+    }
+}
+
+/// Largest m_s and m_t of a one-point map of one texel over the points seen.
+pub(super) fn shape_errors(shape: &Shape, seen: &[Seen], camera: &Camera) -> [f64; 2] {
+    let (mut s, mut t) = (0f64, 0f64);
+    for p in seen {
+        let w = shape.w(p.xz.y);
+        (s, t) = (s.max(p.base * w), t.max(p.height * w * w));
+    }
+    let texel = shape.texel_over_w(1.0, 0.0, [1.0; 2]);
+    let pixel = camera.pixel_width_per_depth();
+    [s * texel.base / pixel, t * texel.height / pixel]
 }
 
 impl Request<'_> {

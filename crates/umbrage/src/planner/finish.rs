@@ -12,8 +12,8 @@ use crate::plan::{ShadowMap, Slab};
 use crate::resolution::enlarged;
 use crate::slab::{all_distances, distances, slab};
 use crate::technique::{Limits, Size, Technique};
-use crate::worst::{self, worst_errors};
-use glam::{DVec2, DVec3};
+use crate::worst::{self, worst_errors, worst_of_shape};
+use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// The largest distance before the receivers at which casters keep their depths, in ranges of the
 /// receivers' depths. Casters beyond it are clamped, so that the receivers' depths keep enough
@@ -50,16 +50,24 @@ struct Texel {
 }
 
 impl Finishing {
-    /// The largest texel over the body's vertices. Also stores the vertices' shadow coordinates in
-    /// `corners`.
-    fn texels(&mut self, map: &ShadowMap, body: &Body) -> Texel {
-        self.corners.clear();
+    /// The largest texel over the body's vertices, or an upper bound of it.
+    fn texels(map: &ShadowMap, draft: &Draft) -> Texel {
+        if let Some(shape) = &draft.shape {
+            let [_, most_w] = draft.range_of_w(shape);
+            let off_axis = draft.outline.iter().map(|&i| draft.seen[i as usize].xz.x);
+            let off_axis = off_axis.map(|x| shape.off_axis(x).abs()).fold(0.0, f64::max);
+            let over_w = shape.texel_over_w(most_w, off_axis, map.resolution.map(f64::from));
+            // Along the beam w is constant, so depth grows by the same over w everywhere.
+            let beam = map.local_from_shadow.z_axis.truncate().normalize_or_zero();
+            let depth_times_w = map.shadow_from_local.row(2).truncate().dot(beam);
+            let longest = over_w.longest();
+            return Texel { metres: longest * most_w, depth: longest * depth_times_w };
+        }
         let mut largest = Texel { metres: 0.0, depth: 0.0 };
-        for local in body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
+        for local in draft.body.vertices().iter().filter_map(|&v| Local::at(map, v)) {
             let metres = local.footprint().longest();
             largest.metres = largest.metres.max(metres);
             largest.depth = largest.depth.max(metres * local.depth_per_metre);
-            self.corners.push(local.shadow);
         }
         largest
     }
@@ -68,10 +76,11 @@ impl Finishing {
     /// the map.
     fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
         let body = &mut self.casters;
-        body.set_box(draft.body.sides(casters.relative_to(map.origin)));
+        body.clear();
+        body.push_box(draft.body.sides(casters.relative_to(map.origin)));
         // The depths of a stable map must not depend on the view, as its caster planes do.
         if draft.stable.is_none() {
-            map.caster_planes.iter().for_each(|&p| body.clip(p));
+            body.clip(&map.caster_planes);
         }
         let depth = |&v: &DVec3| {
             let h = map.shadow_from_local * v.extend(1.0);
@@ -110,7 +119,11 @@ impl Finishing {
             if let Some(stable) = &draft.stable {
                 margin = stable.place(map);
             }
-            map.error = worst_errors(map, &draft.body, camera, &mut self.worst);
+            let Draft { body, seen, shape, .. } = draft;
+            map.error = match shape.or_else(|| draft.stable.as_ref()?.shape(size)) {
+                Some(shape) => worst_of_shape(&shape, size, body, seen, camera, &mut self.worst),
+                None => worst_errors(map, body, camera, &mut self.worst),
+            };
         };
         set(map, size);
         if let Size::MaxError(wanted) = technique.size {
@@ -122,7 +135,7 @@ impl Finishing {
                 set(map, larger);
             }
         }
-        let texel = self.texels(map, &draft.body);
+        let texel = Self::texels(map, draft);
         // Casters onto the gutter that the filter reads count as well.
         let reach = f64::from(technique.filter.reach_texels()) * texel.metres;
         map.caster_planes.iter_mut().for_each(|p| p.offset += reach);
@@ -139,10 +152,16 @@ impl Finishing {
             Some(apex) if is_fixed => all_distances(map, apex),
             Some(apex) => distances(map, apex, &draft.body, texel.metres),
             None if is_fixed => Slab::default(),
+            // Prefilters alone count depths in the slab.
+            None if technique.filter.prefilter().is_none() => Slab::default(),
             None => {
-                let scale = 1.0 / (1.0 + earlier);
-                self.corners.iter_mut().for_each(|c| c.z = (c.z + earlier) * scale);
-                slab(&self.corners, texel.depth * scale)
+                let shadow = |&v: &DVec3| {
+                    let h = map.shadow_from_local * v.extend(1.0);
+                    (h.w > 0.0).then(|| h.xyz() / h.w)
+                };
+                self.corners.clear();
+                self.corners.extend(draft.body.vertices().iter().filter_map(shadow));
+                slab(&self.corners, texel.depth / (1.0 + earlier))
             }
         };
         let height = f64::from(camera.image()[1]);

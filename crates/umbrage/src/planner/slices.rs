@@ -10,15 +10,13 @@ use crate::plan::{Face, Part, ShadowMap};
 use crate::stable::Stable;
 use crate::technique::{Cover, Partition, Warp};
 use crate::warp::LightSpace;
-use glam::DVec2;
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Slicing {
-    /// The receivers of a slice on trial, and its map.
-    body: Body,
+    /// A slice on trial, and its map.
+    draft: Draft,
     trial: ShadowMap,
-    outline: Vec<DVec2>,
 }
 
 /// How one part of the view is sliced.
@@ -60,7 +58,7 @@ impl Planner {
         request: &Request<'_>,
     ) -> partition::Ends {
         let Request { camera, technique, .. } = *request;
-        let (body, Slicing { body: slice, trial, .. }) = (&self.bodies.face, &mut self.slicing);
+        let (body, Slicing { draft, trial }) = (&self.bodies.face, &mut self.slicing);
         let [n, f] = if technique.cover == Cover::Stable || body.is_empty() {
             [camera.near(), camera.far()]
         } else {
@@ -68,13 +66,15 @@ impl Planner {
             range(depths.map(|d| d.clamp(camera.near(), camera.far()))).into()
         };
         partition::split(partition, [n, f], |from, to| {
-            slice.copy_from(body);
             let begin = (from > n).then(|| along.plane_at(from, camera)).flatten();
-            let end = (to < f).then(|| along.plane_at(to, camera)).flatten();
-            begin.into_iter().chain(end.map(Plane::flipped)).for_each(|p| slice.clip(p));
-            trial.clear(camera);
-            let [s, t] = self.drafting.draft(trial, slice, along, warp, true, request);
-            s * t
+            let end = (to < f).then(|| along.plane_at(to, camera)).flatten().map(Plane::flipped);
+            clip_between(&mut draft.body, body, [begin, end]);
+            if warp == Warp::Psm {
+                trial.clear(camera);
+                let [s, t] = self.drafting.draft(trial, draft, along, warp, request);
+                return s * t;
+            }
+            self.drafting.storage(draft, along, warp, request)
         })
     }
 
@@ -102,8 +102,7 @@ impl Planner {
         // own.
         let end = before(reach).filter(|_| !is_last);
         let begin = along.plane_at(split[0], camera).filter(|_| slice > 0);
-        draft.body.copy_from(&self.bodies.face);
-        begin.into_iter().chain(end).for_each(|p| draft.body.clip(p));
+        clip_between(&mut draft.body, &self.bodies.face, [begin, end]);
         map.fade_from = before(split[1]).filter(|_| overlap > 0.0);
         map.cell.extend(end.into_iter().chain(begin));
         map.cell.extend_from_slice(&self.cell);
@@ -112,16 +111,28 @@ impl Planner {
             let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
             Stable::around(request.projector, camera, range)
         });
-        let unit = match &draft.stable {
-            None => self.drafting.draft(map, &draft.body, along, *warp, false, request),
-            // A slice outside the view's range of distances never serves any receiver.
-            Some(_) if split[0] >= camera.far() || reach <= camera.near() => [0.0; 2],
-            Some(stable) => stable.unit_errors(),
+        draft.shape = None;
+        let space = LightSpace::fixed(request.projector, camera);
+        let unit = match draft.stable {
+            None => self.drafting.draft(map, draft, along, *warp, request),
+            Some(stable) => {
+                draft.see(&space, camera);
+                // A slice outside the view's range of distances never serves any receiver.
+                let is_outside = split[0] >= camera.far() || reach <= camera.near();
+                if is_outside { [0.0; 2] } else { stable.unit_errors() }
+            }
         };
         self.units.push(unit);
         let around = self.around.iter().chain(&map.cell).copied();
-        let space = LightSpace::fixed(request.projector, camera);
-        let outline = &mut self.slicing.outline;
-        caster_planes(&mut map.caster_planes, around, &draft.body, &space, outline);
+        caster_planes(&mut map.caster_planes, around, &draft.body, &space, &draft.outline);
+    }
+}
+
+/// Sets `slice` to the part of a body between planes, of which none, one or both are given.
+fn clip_between(slice: &mut Body, body: &Body, planes: [Option<Plane>; 2]) {
+    match planes {
+        [Some(begin), Some(end)] => slice.set_clipped(body, &[begin, end]),
+        [Some(plane), None] | [None, Some(plane)] => slice.set_clipped(body, &[plane]),
+        [None, None] => slice.set_clipped(body, &[]),
     }
 }

@@ -5,12 +5,12 @@ mod adaptive;
 mod light_space;
 mod psm;
 
-pub(crate) use adaptive::least_error;
+pub(crate) use adaptive::Search;
 pub(crate) use light_space::{LightSpace, theta};
 pub(crate) use psm::psm;
 
 use crate::camera::Camera;
-use crate::math::range;
+use crate::math::{largest_stretch, range};
 use crate::technique::Warp;
 use glam::{DMat3, DVec2, DVec3};
 
@@ -52,6 +52,89 @@ impl Seen {
     }
 }
 
+/// The points of a body in light space, with their outline.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View<'a> {
+    pub seen: &'a [Seen],
+    /// Light-space x and z of the corners of the points' convex hull on the light plane. Ratios of
+    /// linear functions of x and z are largest and least there.
+    pub outline: &'a [DVec2],
+}
+
+/// A one-point map of the light plane: w = 1 + `per_z` (z − z₀), s = ((x − center_x)/w −
+/// `low`)/`width` and t = `t_per_z` (z − z₀)/w.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    center_x: f64,
+    z0: f64,
+    per_z: f64,
+    low: f64,
+    width: f64,
+    t_per_z: f64,
+}
+
+/// A texel's footprint on the light plane: a step in s is (`base`, 0), a step in t (`shear`,
+/// `height`), in units of light space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Texel {
+    pub base: f64,
+    pub shear: f64,
+    pub height: f64,
+}
+
+impl Texel {
+    /// Width in the worst direction.
+    pub(crate) fn longest(&self) -> f64 {
+        largest_stretch(
+            self.base * self.base,
+            self.shear * self.shear + self.height * self.height,
+            self.base * self.shear,
+        )
+    }
+}
+
+impl Shape {
+    /// An even map with texels of these widths in x and z.
+    pub(crate) fn even([width, height]: [f64; 2]) -> Self {
+        Self { center_x: 0.0, z0: 0.0, per_z: 0.0, low: 0.0, width, t_per_z: height.recip() }
+    }
+
+    /// Whether all texels have the same shape and size.
+    pub(crate) fn is_even(&self) -> bool {
+        self.per_z == 0.0
+    }
+
+    /// w at light-space z.
+    pub(crate) fn w(&self, z: f64) -> f64 {
+        1.0 + self.per_z * (z - self.z0)
+    }
+
+    /// Distance of a light-space x from the axis of the perspective.
+    pub(crate) fn off_axis(&self, x: f64) -> f64 {
+        x - self.center_x
+    }
+
+    /// The texel, over w, of a map of `resolution` texels where the fourth coordinate is w, at this
+    /// distance from the axis. All its lengths are the longest where both arguments are largest.
+    pub(crate) fn texel_over_w(&self, w: f64, off_axis: f64, [s, t]: [f64; 2]) -> Texel {
+        let per_t = (self.t_per_z * t).recip();
+        Texel {
+            base: self.width / s,
+            shear: off_axis * self.per_z * per_t,
+            height: w * per_t,
+        }
+    }
+
+    /// The homography from (x, z) to (s, t).
+    pub(crate) fn homography(&self) -> DMat3 {
+        let w = DVec3::new(0.0, self.per_z, 1.0 - self.per_z * self.z0);
+        let x = DVec3::new(1.0, 0.0, -self.center_x);
+        let s = (x - w * self.low) / self.width;
+        let t = DVec3::new(0.0, 1.0, -self.z0) * self.t_per_z;
+        DMat3::from_cols(s, t, w).transpose()
+    }
+}
+
 /// A family of one-point perspectives along z, which divide x by w(z) = 1 + ν (z − z₀)/μ. w
 /// grows from 1 at the near plane to 1 + ν at the far plane. ν = μ/λ is the warp's strength; ν
 /// = 0 is no warp.
@@ -70,10 +153,10 @@ pub(crate) struct OnePoint {
 
 impl OnePoint {
     /// The family whose near and far plane enclose the points seen.
-    pub(crate) fn around(seen: &[Seen], space: &LightSpace) -> Self {
-        let (x0, x1) = range(seen.iter().map(|p| p.xz.x));
-        let (z0, z1) = range(seen.iter().map(|p| p.xz.y));
-        let (nearest, farthest) = range(seen.iter().map(|p| p.depth));
+    pub(crate) fn around(view: &View<'_>, space: &LightSpace) -> Self {
+        let (x0, x1) = range(view.outline.iter().map(|p| p.x));
+        let (z0, z1) = range(view.outline.iter().map(|p| p.y));
+        let (nearest, farthest) = range(view.seen.iter().map(|p| p.depth));
         // The viewer is local space's origin. After a spot light's perspective the viewer's image
         // may lie at or beyond infinity; the middle of the points seen replaces it there.
         let center_x = if space.apex.is_some() { x0.midpoint(x1) } else { 0.0 };
@@ -87,30 +170,27 @@ impl OnePoint {
         1.0 + nu / self.mu * (z - self.z0)
     }
 
-    /// Range of x/w over the points seen.
-    fn extent(&self, nu: f64, seen: &[Seen]) -> (f64, f64) {
-        range(seen.iter().map(|p| (p.xz.x - self.center_x) / self.w(nu, p.xz.y)))
+    /// Range of x/w over the outline of the points seen.
+    fn extent(&self, nu: f64, outline: &[DVec2]) -> (f64, f64) {
+        range(outline.iter().map(|p| (p.x - self.center_x) / self.w(nu, p.y)))
     }
 
-    /// The homography of strength ν, scaled so that the points seen fill [0, 1]².
-    pub(crate) fn homography(&self, nu: f64, seen: &[Seen]) -> DMat3 {
-        let (lo, hi) = self.extent(nu, seen);
-        let width = (hi - lo).max(1e-9 * self.mu);
-        let per_z = nu / self.mu;
-        let w = DVec3::new(0.0, per_z, 1.0 - per_z * self.z0);
-        let x = DVec3::new(1.0, 0.0, -self.center_x);
-        let s = (x - w * lo) / width;
-        let t = DVec3::new(0.0, 1.0, -self.z0) * ((1.0 + nu) / self.mu);
-        DMat3::from_cols(s, t, w).transpose()
+    /// The map of strength ν, scaled so that the points seen fill [0, 1]².
+    pub(crate) fn shape(&self, nu: f64, outline: &[DVec2]) -> Shape {
+        let (low, high) = self.extent(nu, outline);
+        let width = (high - low).max(1e-9 * self.mu);
+        let (per_z, t_per_z) = (nu / self.mu, (1.0 + nu) / self.mu);
+        Shape { center_x: self.center_x, z0: self.z0, per_z, low, width, t_per_z }
     }
 
     /// Strength ν of a warp.
     pub(crate) fn strength(
         &self,
         warp: Warp,
-        seen: &[Seen],
+        view: &View<'_>,
         space: &LightSpace,
         camera: &Camera,
+        search: &mut Search,
     ) -> f64 {
         let strength = match warp {
             Warp::Uniform | Warp::Psm => 0.0,
@@ -122,7 +202,7 @@ impl OnePoint {
                 // still better than no warp.
                 let phi = camera.tan_half_fov_y().atan();
                 let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
-                least_error(self, seen, objective) * fade
+                search.least_error(self, view, objective) * fade
             }
             Warp::Lispsm => self.along_view(space, |view| {
                 let f = view.n + (view.f - view.n).min(view.mu_metres * view.sin_theta);
