@@ -210,9 +210,9 @@ pub(crate) fn worst_of_shape(
             }
             splits -= 1;
             // Halving at the middle of 1/z gives both halves similar ranges of z.
-            let share = a.z / (a.z + b.z);
-            let [off_axis, w, z] =
-                [(a.off_axis, b.off_axis), (a.w, b.w), (a.z, b.z)].map(|(a, b)| a + (b - a) * share);
+            let [of_a, of_b] = [b.z, a.z].map(|z| z / (a.z + b.z));
+            let [off_axis, w, z] = [(a.off_axis, b.off_axis), (a.w, b.w), (a.z, b.z)]
+                .map(|(a, b)| a * of_a + b * of_b);
             let mut middle = Point { off_axis, w, z, w_over_z: w / z, error: 0.0 };
             middle.error = middle.w_over_z * norm(w, off_axis);
             best = best.max(middle.error);
