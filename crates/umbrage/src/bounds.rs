@@ -22,7 +22,11 @@ impl Aabb {
 
     /// The smallest box around `points`; [`EMPTY`](Self::EMPTY) if there are none.
     pub fn around(points: impl IntoIterator<Item = DVec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| b.union(Self { min: p, max: p }))
+        // Comparisons are faster than `DVec3::min` and `DVec3::max`.
+        points.into_iter().fold(Self::EMPTY, |b, p| Self {
+            min: DVec3::select(p.cmplt(b.min), p, b.min),
+            max: DVec3::select(p.cmpgt(b.max), p, b.max),
+        })
     }
 
     /// The smallest box around both boxes.
@@ -113,6 +117,13 @@ impl Bounds<'_> {
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.receivers.map_or(Ok(()), |b| b.check("bounds.receivers"))?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
+    }
+}
+
+/// The box that contains no point.
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
     }
 }
 

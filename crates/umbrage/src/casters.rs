@@ -1,6 +1,6 @@
 //! The region from which casters can cast into a map.
 
-use crate::bounds::Plane;
+use crate::bounds::{Aabb, Plane};
 use crate::focus::Body;
 use crate::warp::{LightSpace, Seen};
 use glam::{DVec2, DVec3};
@@ -10,12 +10,13 @@ const TOUCH: f64 = 1e-6;
 
 /// Appends planes around all that can cast onto `body`, which is the body swept towards the light:
 /// those planes of `around` that touch the body and whose inside lies towards the light, and one
-/// plane through every edge of the body's outline as the light sees it. `outline` holds the indices
-/// of its vertices.
+/// plane through every edge of the body's outline as the light sees it. `bounds` is the body's bounding
+/// box, and `outline` holds the indices of the outline's vertices.
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
     around: impl Iterator<Item = Plane>,
     body: &Body,
+    bounds: Aabb,
     space: &LightSpace,
     outline: &[u32],
 ) {
@@ -27,7 +28,6 @@ pub(crate) fn caster_planes(
         Some(apex) => plane.distance(apex) >= 0.0,
     };
     let widen = |p: Plane| Plane { offset: p.offset + slack, ..p };
-    let bounds = body.bounds();
     let touches = |p: &Plane| {
         let is_near = |distance: f64| distance <= TOUCH * size;
         is_near(p.offset + bounds.least_along(p.normal))

@@ -132,11 +132,6 @@ impl Body {
         Aabb::around(self.parts.vertices.iter().copied())
     }
 
-    /// The centre of the body's bounding box, if the body is not empty.
-    pub(crate) fn middle(&self) -> DVec3 {
-        self.bounds().center()
-    }
-
     pub(crate) fn is_empty(&self) -> bool {
         self.parts.vertices.is_empty()
     }
@@ -249,8 +244,8 @@ impl Clipping {
             let mut is_cut = false;
             let is_kept = planes.iter().all(|&plane| {
                 let whole = if is_cut { &self.cell.vertices[..] } else { vertices };
-                let [least, most] = set_distances(&mut self.distances, whole, plane, size);
-                if least < 0.0 && most > 0.0 {
+                let sides = set_distances(&mut self.distances, whole, plane, size);
+                if sides.has_outside && sides.has_inside {
                     if is_cut {
                         let Polyhedron { vertices, edges, faces } = &self.cell;
                         self.cut.set_cut(vertices, edges, *faces, &self.distances);
@@ -261,7 +256,7 @@ impl Clipping {
                     is_cut = true;
                 }
                 // A cell that only touches the plane from outside is gone.
-                least >= 0.0 || most > 0.0
+                sides.has_inside || !sides.has_outside
             });
             if is_kept && is_cut {
                 let Polyhedron { vertices, edges, faces } = &self.cell;
@@ -273,24 +268,30 @@ impl Clipping {
     }
 }
 
-/// Sets the distances of all vertices from a plane. Returns the least and the greatest.
+/// On which sides of a plane vertices lie, apart from those on the plane.
+struct SidesOf {
+    has_inside: bool,
+    has_outside: bool,
+}
+
+/// Sets the distances of all vertices from a plane.
 fn set_distances(
     distances: &mut Vec<f64>,
     vertices: &[DVec3],
     plane: Plane,
     size: f64,
-) -> [f64; 2] {
+) -> SidesOf {
     // Vertices this close to the plane count as on it, so that no slivers arise from rounding.
     let tolerance = 1e-13 * size.max(plane.offset.abs());
-    let [mut least, mut most] = [f64::INFINITY, f64::NEG_INFINITY];
+    let (mut has_inside, mut has_outside) = (false, false);
     distances.clear();
     distances.extend(vertices.iter().map(|&v| {
         let d = plane.distance(v);
-        let d = if d.abs() <= tolerance { 0.0 } else { d };
-        (least, most) = (least.min(d), most.max(d));
-        d
+        has_inside |= d > tolerance;
+        has_outside |= d < -tolerance;
+        if d.abs() <= tolerance { 0.0 } else { d }
     }));
-    [least, most]
+    SidesOf { has_inside, has_outside }
 }
 
 impl Polyhedron {

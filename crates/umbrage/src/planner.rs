@@ -221,8 +221,8 @@ impl Planner {
     fn theta(&self, light: &Light, camera: &Camera) -> f64 {
         let Bodies { view, lit, .. } = &self.bodies;
         let seen = if matches!(light, Light::Spot(_)) { lit } else { view };
-        let middle = if seen.is_empty() { camera.forward() * camera.near() } else { seen.middle() };
-        theta(light, camera, middle)
+        let middle = (!seen.is_empty()).then(|| seen.bounds().center());
+        theta(light, camera, middle.unwrap_or(camera.forward() * camera.near()))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Request;
 use crate::aliasing::Local;
+use crate::bounds::Aabb;
 use crate::camera::Camera;
 use crate::casters::convex_outline;
 use crate::focus::Body;
@@ -21,6 +22,8 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 pub(super) struct Draft {
     /// The receivers that the map serves.
     pub(super) body: Body,
+    /// The body's bounding box; not set if the body is empty.
+    pub(super) bounds: Aabb,
     /// The body's vertices in light space, in the same order.
     pub(super) seen: Vec<Seen>,
     /// Indices of the vertices on the body's outline as the light sees it, counter-clockwise.
@@ -158,12 +161,12 @@ impl Drafting {
             return None;
         }
         let covers_scene = technique.cover == Cover::Scene;
+        draft.bounds = draft.body.bounds();
+        let middle = draft.bounds.center();
         let space = match along {
             _ if covers_scene => LightSpace::fixed(projector, camera),
-            Along::View => LightSpace::following_view(projector, camera, draft.body.middle()),
-            Along::Side(side) => {
-                LightSpace::following_face(projector, camera, side, draft.body.middle())
-            }
+            Along::View => LightSpace::following_view(projector, camera, middle),
+            Along::Side(side) => LightSpace::following_face(projector, camera, side, middle),
         };
         draft.see(&space, camera);
         let Self { covered, outline, hull, search, .. } = self;

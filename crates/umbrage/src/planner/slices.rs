@@ -116,6 +116,7 @@ impl Planner {
         let unit = match draft.stable {
             None => self.drafting.draft(map, draft, along, *warp, request),
             Some(stable) => {
+                draft.bounds = draft.body.bounds();
                 draft.see(&space, camera);
                 // A slice outside the view's range of distances never serves any receiver.
                 let is_outside = split[0] >= camera.far() || reach <= camera.near();
@@ -124,7 +125,8 @@ impl Planner {
         };
         self.units.push(unit);
         let around = self.around.iter().chain(&map.cell).copied();
-        caster_planes(&mut map.caster_planes, around, &draft.body, &space, &draft.outline);
+        let Draft { body, bounds, outline, .. } = &*draft;
+        caster_planes(&mut map.caster_planes, around, body, *bounds, &space, outline);
     }
 }
 

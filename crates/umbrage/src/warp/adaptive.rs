@@ -7,8 +7,14 @@ const FEW: usize = 40;
 /// Number of ranges of view depth that stand for more points than [`FEW`].
 const RANGES: usize = 32;
 
-/// Steps of golden section search, which shrink the bracket to 1e-6 of its width.
-const GOLDEN_STEPS: usize = 28;
+/// The largest number of steps after the coarse scan.
+const MOST_STEPS: usize = 48;
+
+/// The search ends where ω is known to this.
+const TOLERANCE: f64 = 1e-7;
+
+/// The search also ends where the logarithm of the cost varies by this alone.
+const FLATNESS: f64 = 1e-13;
 
 /// Finds the strength of least error. The buffer is kept from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -54,32 +60,57 @@ impl Search {
         objective: Objective,
     ) -> f64 {
         self.set_front(family, view.seen);
-        let cost = |omega: f64| cost(family, &self.front, view, objective, omega.exp_m1());
+        let front = &self.front;
+        let cost = |omega: f64| {
+            let nu = omega.exp_m1();
+            Cost::of(family, nu, view, objective, front.iter().copied())
+        };
         // For warps stronger than the view's own perspective every error grows.
         let end = (family.farthest / family.nearest).ln() + 1.0;
         const STEPS: usize = 8;
-        let at = |i: usize| end * (i as f64) / STEPS as f64;
-        let best = (0..=STEPS).map(|i| (cost(at(i)), i)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let best = best.map_or(0, |(_, i)| i);
-        let (mut lo, mut hi) = (at(best.saturating_sub(1)), at((best + 1).min(STEPS)));
-        const RATIO: f64 = 0.618_033_988_749_894_9;
-        let (mut a, mut b) = (hi - RATIO * (hi - lo), lo + RATIO * (hi - lo));
-        let (mut cost_a, mut cost_b) = (cost(a), cost(b));
-        for _ in 0..GOLDEN_STEPS {
-            if cost_a <= cost_b {
-                (hi, b, cost_b) = (b, a, cost_a);
-                a = hi - RATIO * (hi - lo);
-                cost_a = cost(a);
-            } else {
-                (lo, a, cost_a) = (a, b, cost_b);
-                b = lo + RATIO * (hi - lo);
-                cost_b = cost(b);
+        let scan: [Cost; STEPS + 1] = std::array::from_fn(|i| cost(end * (i as f64) / STEPS as f64));
+        let best = scan.iter().enumerate().min_by(|a, b| a.1.value.total_cmp(&b.1.value));
+        let best = best.map_or(0, |(i, _)| i);
+        let [mut lo, mut hi] = [best.saturating_sub(1), (best + 1).min(STEPS)]
+            .map(|i| (end * (i as f64) / STEPS as f64, scan[i].value.ln(), scan[i].slope));
+        // The middle of the bracket is known.
+        let mut at = end * (best as f64) / STEPS as f64;
+        let mut found = scan[best];
+        let mut last_was_low = None;
+        let mut reach = 0.5 * TOLERANCE;
+        for _ in 0..MOST_STEPS {
+            let is_low = found.slope < 0.0;
+            let end = if is_low { &mut lo } else { &mut hi };
+            *end = (at, found.value.ln(), found.slope);
+            let width = hi.0 - lo.0;
+            let steepest = hi.2.abs().max(lo.2.abs());
+            if width <= TOLERANCE || steepest * width <= FLATNESS {
+                break;
             }
+            // The minimum of a convex function lies near the point where the tangents at both ends
+            // of the bracket meet: at it, if the function has a kink there. If the same end has
+            // moved twice, the other's tangent is not to be trusted, so the next point is a little
+            // farther from the end that moved, and farther each time.
+            let meet = (hi.1 - lo.1 + lo.2 * lo.0 - hi.2 * hi.0) / (lo.2 - hi.2);
+            let is_again = last_was_low == Some(is_low);
+            last_was_low = Some(is_low);
+            reach = if is_again { 8.0 * reach } else { 0.5 * TOLERANCE };
+            let further = if is_again { 4.0 } else { 1.0 };
+            let next = match is_low {
+                true => lo.0 + (further * (meet - lo.0)).max(reach),
+                false => hi.0 - (further * (hi.0 - meet)).max(reach),
+            };
+            let is_inside = next > lo.0 && next < hi.0;
+            at = if is_inside { next } else { lo.0.midpoint(hi.0) };
+            found = cost(at);
         }
-        let nu = lo.midpoint(hi).exp_m1();
+        let omega = if lo.1 <= hi.1 { lo.0 } else { hi.0 };
+        let nu = omega.exp_m1();
         // The minimum may be at the bracket's lower end: no warp. The front may stand for points
         // that do not exist, so the points themselves decide.
-        let exact = |nu: f64| objective_of(family, nu, view, objective, view.seen.iter().map(Front::of));
+        let exact = |nu: f64| {
+            Cost::of(family, nu, view, objective, view.seen.iter().map(Front::of)).value
+        };
         if exact(0.0) <= exact(nu) { 0.0 } else { nu }
     }
 
@@ -113,41 +144,70 @@ impl Search {
     }
 }
 
-/// The quantity to minimise.
-fn cost(
-    family: &OnePoint,
-    front: &[Front],
-    view: &View<'_>,
-    objective: Objective,
-    nu: f64,
-) -> f64 {
-    objective_of(family, nu, view, objective, front.iter().copied())
+/// The quantity to minimise, and the derivative of its logarithm with respect to ω = ln(1 + ν).
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    value: f64,
+    slope: f64,
 }
 
-fn objective_of(
-    family: &OnePoint,
-    nu: f64,
-    view: &View<'_>,
-    objective: Objective,
-    points: impl Iterator<Item = Front>,
-) -> f64 {
-    let (lo, hi) = family.extent(nu, view.outline);
-    let (mut s, mut t, mut area) = (0f64, 0f64, 0f64);
-    for p in points {
-        let w = family.w(nu, p.z);
-        let (at_s, at_t) = (p.base * w, p.height * w * w);
-        s = s.max(at_s);
-        t = t.max(at_t);
-        area = area.max(at_s * at_t);
-    }
-    let per_row = 1.0 / (1.0 + nu);
-    match objective {
-        // With light overhead every λ from n to n + √(n f) needs the same storage. Of these the
-        // one with the least largest m_t is best, and preferring it also prevents jumps of λ. t is
-        // divided by its value at the view's nearest point, where it is largest without a warp.
-        Objective::Storage => {
-            (hi - lo) * per_row * s * t * (1.0 + 1e-6 * t * per_row * family.nearest)
+impl Cost {
+    fn of(
+        family: &OnePoint,
+        nu: f64,
+        view: &View<'_>,
+        objective: Objective,
+        points: impl Iterator<Item = Front>,
+    ) -> Self {
+        // Each largest or least value comes with d ln w/dω = (1 + ν) ζ/w where it is found.
+        let growth = |z: f64, w: f64| (1.0 + nu) * (z - family.z0) / (family.mu * w);
+        let (mut lo, mut hi) = ((f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0));
+        for p in view.outline {
+            let w = family.w(nu, p.y);
+            let x = (p.x - family.center_x) / w;
+            if x < lo.0 {
+                lo = (x, growth(p.y, w));
+            }
+            if x > hi.0 {
+                hi = (x, growth(p.y, w));
+            }
         }
-        Objective::Area => (hi - lo) * per_row * area,
+        let (mut s, mut t, mut area) = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0));
+        for p in points {
+            let w = family.w(nu, p.z);
+            let (at_s, at_t) = (p.base * w, p.height * w * w);
+            if at_s > s.0 {
+                s = (at_s, growth(p.z, w));
+            }
+            if at_t > t.0 {
+                t = (at_t, growth(p.z, w));
+            }
+            if at_s * at_t > area.0 {
+                area = (at_s * at_t, growth(p.z, w));
+            }
+        }
+        let width = hi.0 - lo.0;
+        let per_row = 1.0 / (1.0 + nu);
+        let of_width = (lo.0 * lo.1 - hi.0 * hi.1) / width;
+        match objective {
+            // With light overhead every λ from n to n + √(n f) needs the same storage. Of these the
+            // one with the least largest m_t is best, and preferring it also prevents jumps of λ. t
+            // is divided by its value at the view's nearest point, where it is largest without a
+            // warp.
+            Objective::Storage => {
+                let preference = 1e-6 * t.0 * per_row * family.nearest;
+                Self {
+                    value: width * per_row * s.0 * t.0 * (1.0 + preference),
+                    slope: of_width - 1.0
+                        + s.1
+                        + 2.0 * t.1
+                        + preference / (1.0 + preference) * (2.0 * t.1 - 1.0),
+                }
+            }
+            Objective::Area => Self {
+                value: width * per_row * area.0,
+                slope: of_width - 1.0 + 3.0 * area.1,
+            },
+        }
     }
 }
