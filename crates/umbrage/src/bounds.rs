@@ -149,6 +149,11 @@ impl Plane {
         self.normal.dot(p) + self.offset
     }
 
+    /// Whether all of `aabb` lies inside the half-space.
+    pub(crate) fn contains(self, aabb: Aabb) -> bool {
+        self.offset + aabb.least_along(self.normal) >= 0.0
+    }
+
     /// The complementary half-space.
     pub(crate) fn flipped(self) -> Self {
         Self { normal: -self.normal, offset: -self.offset }

@@ -59,35 +59,49 @@ pub(crate) fn caster_planes(
 /// Number of points above which those inside of an octagon are left out first.
 const MANY: usize = 24;
 
+/// Sets `outer` to the indices of the points on the light plane that may lie on the convex hull of
+/// all: those that are not inside the octagon of the points farthest in eight directions (Akl and
+/// Toussaint 1978).
+pub(crate) fn outer_points(outer: &mut Vec<u32>, points: &[Seen]) {
+    outer.clear();
+    if points.len() <= MANY {
+        outer.extend(0..points.len() as u32);
+        return;
+    }
+    // The loops over all eight directions have no branches, so that they become vector code.
+    let mut farthest = [f64::NEG_INFINITY; 8];
+    let mut corners = [DVec2::ZERO; 8];
+    for p in points {
+        let DVec2 { x, y: z } = p.xz;
+        // Counter-clockwise.
+        let along = [x, x + z, z, z - x, -x, -x - z, -z, x - z];
+        let is_farther: [bool; 8] = std::array::from_fn(|i| along[i] > farthest[i]);
+        if is_farther.iter().fold(false, |any, &is| any | is) {
+            for i in (0..8).filter(|&i| is_farther[i]) {
+                (farthest[i], corners[i]) = (along[i], p.xz);
+            }
+        }
+    }
+    // Each side by its inward normal and the normal's product with a point on the side. A side
+    // without length has nothing outside.
+    let next = |i: usize| corners[(i + 1) % 8] - corners[i];
+    let normals: [DVec2; 8] = std::array::from_fn(|i| next(i).perp());
+    let (nx, nz) = (normals.map(|n| n.x), normals.map(|n| n.y));
+    let least: [f64; 8] = std::array::from_fn(|i| {
+        if next(i) == DVec2::ZERO { -1.0 } else { normals[i].dot(corners[i]) }
+    });
+    let is_inside = |p: DVec2| {
+        let inside: [bool; 8] = std::array::from_fn(|i| nx[i] * p.x + nz[i] * p.y > least[i]);
+        inside.iter().fold(true, |all, &is| all & is)
+    };
+    outer.extend((0u32..).zip(points).filter(|(_, p)| !is_inside(p.xz)).map(|(i, _)| i));
+}
+
 /// Sets the convex hull of points on the light plane, as their indices, counter-clockwise (Andrew's
 /// monotone chain).
 pub(crate) fn convex_outline(hull: &mut Vec<u32>, points: &[Seen]) {
     let at = |i: u32| points[i as usize].xz;
-    hull.clear();
-    if points.len() > MANY {
-        // Points inside the octagon of the points farthest in eight directions are not on the hull
-        // (Akl and Toussaint 1978).
-        let ways = OCTAGON.map(|[x, z]| DVec2::new(x, z));
-        let mut farthest = [(f64::NEG_INFINITY, DVec2::ZERO); 8];
-        for p in points {
-            for (far, way) in farthest.iter_mut().zip(ways) {
-                let along = way.dot(p.xz);
-                if along > far.0 {
-                    *far = (along, p.xz);
-                }
-            }
-        }
-        let corners = farthest.map(|(_, corner)| corner);
-        let inside = |p: DVec2| {
-            (0..8).all(|i| {
-                let [a, b] = [corners[i], corners[(i + 1) % 8]];
-                a == b || (b - a).perp_dot(p - a) > 0.0
-            })
-        };
-        hull.extend((0..points.len() as u32).filter(|&i| !inside(at(i))));
-    } else {
-        hull.extend(0..points.len() as u32);
-    }
+    outer_points(hull, points);
     let order = |a: DVec2, b: DVec2| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
     hull.sort_unstable_by(|&a, &b| order(at(a), at(b)));
     hull.dedup_by(|a, b| at(*a) == at(*b));
@@ -115,15 +129,3 @@ pub(crate) fn convex_outline(hull: &mut Vec<u32>, points: &[Seen]) {
     chain(&mut (0..n).rev());
     hull.drain(..n);
 }
-
-/// Eight directions, counter-clockwise.
-const OCTAGON: [[f64; 2]; 8] = [
-    [1.0, 0.0],
-    [1.0, 1.0],
-    [0.0, 1.0],
-    [-1.0, 1.0],
-    [-1.0, 0.0],
-    [-1.0, -1.0],
-    [0.0, -1.0],
-    [1.0, -1.0],
-];

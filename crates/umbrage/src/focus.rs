@@ -158,13 +158,20 @@ impl Body {
     pub(crate) fn clip(&mut self, planes: &[Plane]) {
         let Self { parts, size, clipping } = self;
         let mut kept = std::mem::take(&mut clipping.kept);
+        kept.clear();
         clipping.clip(parts, *size, planes, &mut kept);
         clipping.kept = std::mem::replace(parts, kept);
     }
 
     /// Replaces the body by the part of another that lies inside all planes.
     pub(crate) fn set_clipped(&mut self, other: &Self, planes: &[Plane]) {
-        self.size = other.size;
+        self.clear();
+        self.append_clipped(other, planes);
+    }
+
+    /// Appends the part of another body that lies inside all planes.
+    pub(crate) fn append_clipped(&mut self, other: &Self, planes: &[Plane]) {
+        self.size = self.size.max(other.size);
         self.clipping.clip(&other.parts, other.size, planes, &mut self.parts);
     }
 }
@@ -235,9 +242,8 @@ impl Parts {
 }
 
 impl Clipping {
-    /// Sets `kept` to what lies inside all planes.
+    /// Appends what lies inside all planes to `kept`.
     fn clip(&mut self, parts: &Parts, size: f64, planes: &[Plane], kept: &mut Parts) {
-        kept.clear();
         for cell in &parts.cells {
             let (vertices, edges) = parts.of(cell);
             // A cell is copied when a plane cuts it for the first time.

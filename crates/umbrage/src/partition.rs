@@ -199,85 +199,89 @@ pub(crate) fn split(
     ends
 }
 
-/// The share by which the storage of fitted slices may differ. All slices but the last are a
-/// thousand times as accurate, because each begins where the previous one ends and their errors
-/// accumulate.
-const FITTED: f64 = 1e-3;
+/// The ratio of the largest storage of a fitted slice to the least with which the search ends.
+const ALIKE: f64 = 1.09;
 
-/// Moves all but the first and the last end so that all slices need the same storage.
+/// The share of the best ratio so far that a useful round attains at most. The search ends after two
+/// rounds that are of no use.
+const USEFUL: f64 = 0.95;
+
+/// The largest number of times that all slices are tried.
+const MOST_ROUNDS: usize = 6;
+
+/// Moves all but the first and the last end so that all slices need similar storage.
 ///
-/// For a given storage, slices are laid one after the other from the near end. The storage is right
-/// if the last slice then ends at the far end. A slice's storage is monotonic in both its ends, so
-/// both searches have a unique solution.
+/// Let x be the logarithm of a slice's range, its far end over its near end. Where receivers fill
+/// the view, the storage of an even map grows as e²ˣ − eˣ, and that of others more slowly. In each
+/// round every slice's ln x is a secant away from the storage that all would share. Storage can jump
+/// where a slice reaches a receiver, and then no ends may be right; of all ends tried, those whose
+/// storages differ least are taken.
 fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
     let k = ends.len() - 1;
     let [n, f] = [ends[0], ends[k]];
     if k == 1 || f <= n {
         return;
     }
-    let most = storage(n, f).ln();
-    // Logarithm of a slice's storage over the allowed one. An empty slice needs no storage, so the
-    // logarithm is clamped; far from 0 its size does not matter.
-    let mut over = |a: f64, b: f64, allowed: f64| (storage(a, b).ln() - allowed).clamp(-2.0, 2.0);
-    let mut excess_of_last = |allowed: f64| {
+    let whole = (f / n).ln();
+    let mut lengths = [whole / k as f64; Partition::MAX_SLICES];
+    let mut best = (f64::INFINITY, Ends::default());
+    let mut useless = 0;
+    // Lengths and storages of the last round, as logarithms.
+    let mut last: Option<[[f64; 2]; Partition::MAX_SLICES]> = None;
+    for _ in 0..MOST_ROUNDS {
         for i in 1..k {
-            let begin = ends[i - 1];
-            let whole = over(begin, f, allowed);
-            let range = [begin.ln(), f.ln()];
-            ends[i] = if whole <= 0.0 || begin >= f {
-                f
-            } else {
-                root(range, [-2.0, whole], FITTED / 1000.0, |end| over(begin, end.exp(), allowed))
-                    .exp()
-            };
+            ends[i] = (ends[i - 1] * lengths[i - 1].exp()).min(f);
         }
-        if ends[k - 1] >= f { -2.0 } else { over(ends[k - 1], f, allowed) }
-    };
-    // The first slice may need all of the storage, which gives an upper bound. A lower bound is
-    // found by trying.
-    let mut least = most - 1.0;
-    let mut at_least = excess_of_last(least);
-    for step in [2.0, 4.0, 8.0, 16.0, 32.0] {
-        if at_least <= 0.0 {
-            least -= step;
-            at_least = excess_of_last(least);
+        let mut tried = [[0.0; 2]; Partition::MAX_SLICES];
+        let mut extremes = (f64::INFINITY, 0f64);
+        for (i, slice) in tried.iter_mut().enumerate().take(k) {
+            let needed = storage(ends[i], ends[i + 1]);
+            extremes = (extremes.0.min(needed), extremes.1.max(needed));
+            *slice = [lengths[i].ln(), needed];
         }
-    }
-    if at_least > 0.0 {
-        root([least, most], [-at_least, 2.0], FITTED, |allowed| -excess_of_last(allowed));
-    }
-}
-
-/// A root of an increasing function between `lo` and `hi`, given its values there, to within
-/// `tolerance` of the function's value. This is false position with the Illinois correction, but
-/// every third step bisects, because storage can be discontinuous where a slice begins. The
-/// function's last call is at the root returned.
-fn root(
-    [mut lo, mut hi]: [f64; 2],
-    [mut at_lo, mut at_hi]: [f64; 2],
-    tolerance: f64,
-    mut function: impl FnMut(f64) -> f64,
-) -> f64 {
-    let mut x = hi;
-    let mut last_was_low = None;
-    for step in 1..60 {
-        let secant = hi - at_hi * (hi - lo) / (at_hi - at_lo);
-        let is_inside = secant > lo && secant < hi && step % 3 != 0;
-        x = if is_inside { secant } else { lo.midpoint(hi) };
-        let y = function(x);
-        if y.abs() <= tolerance || hi - lo <= 1e-12 * (1.0 + hi.abs()) {
+        let ratio = extremes.1 / extremes.0;
+        useless = if ratio < USEFUL * best.0 { 0 } else { useless + 1 };
+        if ratio < best.0 || best.0.is_infinite() {
+            best.0 = ratio;
+            best.1[..=k].copy_from_slice(ends);
+        }
+        if ratio <= ALIKE || extremes.1 == 0.0 || useless == 2 {
             break;
         }
-        let is_low = y < 0.0;
-        let again = last_was_low == Some(is_low);
-        last_was_low = Some(is_low);
-        if is_low {
-            (lo, at_lo) = (x, y);
-            at_hi *= if again { 0.5 } else { 1.0 };
-        } else {
-            (hi, at_hi) = (x, y);
-            at_lo *= if again { 0.5 } else { 1.0 };
+        // An empty slice counts as one that needs next to nothing.
+        let least = 1e-2 * extremes.1;
+        tried.iter_mut().take(k).for_each(|slice| slice[1] = slice[1].max(least).ln());
+        // d ln(storage)/d ln(length) of each slice.
+        let mut growth = [0.0; Partition::MAX_SLICES];
+        for i in 0..k {
+            let even = lengths[i] * (2.0 + 1.0 / lengths[i].exp_m1());
+            growth[i] = 0.5 * (1.0 + even);
+            if let Some(last) = last {
+                let [dx, ds] = [0, 1].map(|j| tried[i][j] - last[i][j]);
+                if dx.abs() > 1e-3 {
+                    growth[i] = (ds / dx).clamp(0.5, 2.0 * even);
+                }
+            }
         }
+        // The shared storage is the one at which the lengths add up.
+        let total = |level: f64| -> f64 {
+            (0..k).map(|i| (tried[i][0] + step(level - tried[i][1], growth[i])).exp()).sum()
+        };
+        let (mut lo, mut hi) = (least.ln(), extremes.1.ln());
+        for _ in 0..30 {
+            let middle = lo.midpoint(hi);
+            if total(middle) < whole { lo = middle } else { hi = middle }
+        }
+        let level = lo.midpoint(hi);
+        for i in 0..k {
+            lengths[i] = (tried[i][0] + step(level - tried[i][1], growth[i])).exp();
+        }
+        last = Some(tried);
     }
-    x
+    ends[..k].copy_from_slice(&best.1[..k]);
+}
+
+/// The change of a slice's ln length for a change of its ln storage.
+fn step(change: f64, growth: f64) -> f64 {
+    (change / growth).clamp(-1.5, 1.5)
 }

@@ -167,7 +167,8 @@ impl Planner {
 
     /// Finds the body of the receivers that the camera sees.
     fn focus(&mut self, camera: &Camera, bounds: &Bounds<'_>) {
-        let view = &mut self.bodies.view;
+        // `lit` is not in use yet; it holds one box at a time.
+        let Bodies { view, lit: part, .. } = &mut self.bodies;
         let local = |aabb: Aabb| aabb.relative_to(camera.eye());
         view.set_frustum(camera);
         self.around.clear();
@@ -185,8 +186,14 @@ impl Planner {
             self.opening.choose(tree, camera, &self.around, seen, Self::MOST_PARTS);
             let size = view.size();
             view.clear();
-            self.opening.boxes().for_each(|aabb| view.push_box(sides(aabb, size)));
-            view.clip(&self.around);
+            for aabb in self.opening.boxes() {
+                let sides = sides(aabb, size);
+                self.cell.clear();
+                self.cell.extend(self.around.iter().filter(|p| !p.contains(aabb)));
+                part.clear();
+                part.push_box(sides);
+                view.append_clipped(part, &self.cell);
+            }
         }
     }
 

@@ -201,9 +201,7 @@ pub(crate) fn worst_of_shape(
         segments.clear();
         segments.extend(cell.edges().map(|ends| ends.map(|i| points[i])));
         while let Some([a, b]) = segments.pop() {
-            let over_w = |p: &Point| p.error / p.w_over_z;
-            let bound = (a.w_over_z.max(b.w_over_z) * over_w(&a).max(over_w(&b)))
-                .min(a.w.max(b.w) * (a.error / a.w).max(b.error / b.w));
+            let bound = edge_bound(&a, &b);
             if bound <= best * (1.0 + TOLERANCE) || splits == 0 {
                 settled = settled.max(if bound.is_finite() { bound } else { 0.0 });
                 continue;
@@ -220,6 +218,34 @@ pub(crate) fn worst_of_shape(
         }
     }
     error(settled.max(best))
+}
+
+/// Upper bound of the error in the worst direction between two points.
+///
+/// The error is w g/z, where w and z are linear from one point to the other, and the norm g is
+/// convex. So g is at most what is linear between its values at the ends, and the bound is the
+/// maximum of a quadratic function over a linear one.
+fn edge_bound(a: &Point, b: &Point) -> f64 {
+    let [g_a, g_b] = [a, b].map(|p| p.error / p.w_over_z);
+    let ends = a.error.max(b.error);
+    let (dw, dg, dz) = (b.w - a.w, g_b - g_a, b.z - a.z);
+    let numerator = [a.w * g_a, a.w * dg + dw * g_a, dw * dg];
+    // The sign of the second derivative is the same everywhere.
+    let curvature = numerator[2] * a.z * a.z - numerator[1] * a.z * dz + numerator[0] * dz * dz;
+    if curvature >= 0.0 {
+        return ends;
+    }
+    // The numerator of the derivative is c + 2 h x + k x², where x is the share of the way.
+    let c = numerator[1] * a.z - numerator[0] * dz;
+    let [h, k] = [numerator[2] * a.z, numerator[2] * dz];
+    let root = (h * h - k * c).max(0.0).sqrt();
+    // Both forms of the solutions, of which one is exact where the other divides by almost 0.
+    let solutions = [(-h + root) / k, (-h - root) / k, c / (-h + root), c / (-h - root)];
+    let at = |x: f64| {
+        let value = (a.w + dw * x) * (g_a + dg * x) / (a.z + dz * x);
+        if (0.0..=1.0).contains(&x) { value } else { 0.0 }
+    };
+    solutions.into_iter().map(at).fold(ends, f64::max)
 }
 
 fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -4,7 +4,7 @@ use super::Request;
 use crate::aliasing::Local;
 use crate::bounds::Aabb;
 use crate::camera::Camera;
-use crate::casters::convex_outline;
+use crate::casters::{convex_outline, outer_points};
 use crate::focus::Body;
 use crate::math::range;
 use crate::matrices::{DepthRange, filling_unit_square, lambda, matrices};
@@ -13,7 +13,7 @@ use crate::plan::{MapError, Part, Rows, ShadowMap, Slab};
 use crate::slab::along_axis;
 use crate::stable::{Stable, bounding_sphere};
 use crate::technique::{Cover, Objective, Warp};
-use crate::warp::{LightSpace, OnePoint, Search, Seen, Shape, View, psm};
+use crate::warp::{LightSpace, OnePoint, Precision, Search, Seen, Shape, View, psm};
 use crate::worst::{self, worst_errors};
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
@@ -59,10 +59,14 @@ const FEW_CELLS: usize = 4;
 
 impl Draft {
     /// Sets what the light sees of the body.
-    pub(super) fn see(&mut self, space: &LightSpace, camera: &Camera) {
+    pub(super) fn see(&mut self, space: &LightSpace, camera: &Camera, precision: Precision) {
         self.seen.clear();
         self.seen.extend(self.body.vertices().iter().map(|&v| Seen::new(v, space, camera)));
-        convex_outline(&mut self.outline, &self.seen);
+        match precision {
+            Precision::Final => convex_outline(&mut self.outline, &self.seen),
+            // More points than those on the outline are right as well.
+            Precision::Trial => outer_points(&mut self.outline, &self.seen),
+        }
     }
 
     /// The least and the largest w of a one-point map over the points seen.
@@ -82,7 +86,9 @@ impl Drafting {
         warp: Warp,
         request: &Request<'_>,
     ) -> [f64; 2] {
-        let Some(Chosen { space, family, nu }) = self.choose(draft, along, warp, request) else {
+        let Some(Chosen { space, family, nu }) =
+            self.choose(draft, along, warp, Precision::Final, request)
+        else {
             return [0.0; 2];
         };
         let camera = request.camera;
@@ -138,7 +144,9 @@ impl Drafting {
         warp: Warp,
         request: &Request<'_>,
     ) -> f64 {
-        let Some(Chosen { family, nu, .. }) = self.choose(draft, along, warp, request) else {
+        let Some(Chosen { family, nu, .. }) =
+            self.choose(draft, along, warp, Precision::Trial, request)
+        else {
             return 0.0;
         };
         let [s, t] = shape_errors(&family.shape(nu, &self.outline), &draft.seen, request.camera);
@@ -152,6 +160,7 @@ impl Drafting {
         draft: &mut Draft,
         along: &Along,
         warp: Warp,
+        precision: Precision,
         request: &Request<'_>,
     ) -> Option<Chosen> {
         let Request { camera, projector, technique, .. } = *request;
@@ -168,7 +177,7 @@ impl Drafting {
             Along::View => LightSpace::following_view(projector, camera, middle),
             Along::Side(side) => LightSpace::following_face(projector, camera, side, middle),
         };
-        draft.see(&space, camera);
+        draft.see(&space, camera, precision);
         let Self { covered, outline, hull, search, .. } = self;
         let see = |p: DVec3| Seen::new(p, &space, camera);
         covered.clear();
@@ -194,7 +203,7 @@ impl Drafting {
         }
         let view = View { seen: covered, outline };
         let family = OnePoint::around(&view, &space);
-        let nu = family.strength(warp, &view, &space, camera, search);
+        let nu = family.strength(warp, &view, &space, camera, (search, precision));
         Some(Chosen { space, family, nu })
     }
 }

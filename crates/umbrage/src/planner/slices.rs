@@ -9,7 +9,7 @@ use crate::partition::{self, Along};
 use crate::plan::{Face, Part, ShadowMap};
 use crate::stable::Stable;
 use crate::technique::{Cover, Partition, Warp};
-use crate::warp::LightSpace;
+use crate::warp::{LightSpace, Precision};
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -69,7 +69,7 @@ impl Planner {
             let begin = (from > n).then(|| along.plane_at(from, camera)).flatten();
             let end = (to < f).then(|| along.plane_at(to, camera)).flatten().map(Plane::flipped);
             clip_between(&mut draft.body, body, [begin, end]);
-            if warp == Warp::Psm {
+            if matches!(warp, Warp::Psm | Warp::Log) {
                 trial.clear(camera);
                 let [s, t] = self.drafting.draft(trial, draft, along, warp, request);
                 return s * t;
@@ -117,7 +117,7 @@ impl Planner {
             None => self.drafting.draft(map, draft, along, *warp, request),
             Some(stable) => {
                 draft.bounds = draft.body.bounds();
-                draft.see(&space, camera);
+                draft.see(&space, camera, Precision::Final);
                 // A slice outside the view's range of distances never serves any receiver.
                 let is_outside = split[0] >= camera.far() || reach <= camera.near();
                 if is_outside { [0.0; 2] } else { stable.unit_errors() }

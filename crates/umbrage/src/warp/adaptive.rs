@@ -8,13 +8,34 @@ const FEW: usize = 40;
 const RANGES: usize = 32;
 
 /// The largest number of steps after the coarse scan.
-const MOST_STEPS: usize = 48;
+const MOST_STEPS: usize = 24;
 
-/// The search ends where ω is known to this.
-const TOLERANCE: f64 = 1e-7;
+/// How precisely a strength is searched for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Precision {
+    /// As precisely as matters to the errors of a map.
+    Final,
+    /// Only to compare the storage of slices.
+    Trial,
+}
 
-/// The search also ends where the logarithm of the cost varies by this alone.
-const FLATNESS: f64 = 1e-13;
+impl Precision {
+    /// The search ends where ω is known to this.
+    fn tolerance(self) -> f64 {
+        match self {
+            Self::Final => 1e-7,
+            Self::Trial => 1e-3,
+        }
+    }
+
+    /// The search also ends where the logarithm of the cost varies by this alone.
+    fn flatness(self) -> f64 {
+        match self {
+            Self::Final => 1e-13,
+            Self::Trial => 1e-4,
+        }
+    }
+}
 
 /// Finds the strength of least error. The buffer is kept from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +79,9 @@ impl Search {
         family: &OnePoint,
         view: &View<'_>,
         objective: Objective,
+        precision: Precision,
     ) -> f64 {
+        let (tolerance, flatness) = (precision.tolerance(), precision.flatness());
         self.set_front(family, view.seen);
         let front = &self.front;
         let cost = |omega: f64| {
@@ -67,7 +90,7 @@ impl Search {
         };
         // For warps stronger than the view's own perspective every error grows.
         let end = (family.farthest / family.nearest).ln() + 1.0;
-        const STEPS: usize = 8;
+        const STEPS: usize = 6;
         let scan: [Cost; STEPS + 1] = std::array::from_fn(|i| cost(end * (i as f64) / STEPS as f64));
         let best = scan.iter().enumerate().min_by(|a, b| a.1.value.total_cmp(&b.1.value));
         let best = best.map_or(0, |(i, _)| i);
@@ -76,15 +99,16 @@ impl Search {
         // The middle of the bracket is known.
         let mut at = end * (best as f64) / STEPS as f64;
         let mut found = scan[best];
+        let jump = hi.2 - lo.2;
         let mut last_was_low = None;
-        let mut reach = 0.5 * TOLERANCE;
+        let mut reach = 0.5 * tolerance;
         for _ in 0..MOST_STEPS {
             let is_low = found.slope < 0.0;
             let end = if is_low { &mut lo } else { &mut hi };
             *end = (at, found.value.ln(), found.slope);
             let width = hi.0 - lo.0;
             let steepest = hi.2.abs().max(lo.2.abs());
-            if width <= TOLERANCE || steepest * width <= FLATNESS {
+            if width <= tolerance || steepest * width <= flatness {
                 break;
             }
             // The minimum of a convex function lies near the point where the tangents at both ends
@@ -94,8 +118,12 @@ impl Search {
             let meet = (hi.1 - lo.1 + lo.2 * lo.0 - hi.2 * hi.0) / (lo.2 - hi.2);
             let is_again = last_was_low == Some(is_low);
             last_was_low = Some(is_low);
-            reach = if is_again { 8.0 * reach } else { 0.5 * TOLERANCE };
+            reach = if is_again { 8.0 * reach } else { 0.5 * tolerance };
             let further = if is_again { 4.0 } else { 1.0 };
+            // Where the slopes approach each other there is no kink, and the minimum is a root of the
+            // slope.
+            let is_smooth = hi.2 - lo.2 < 0.25 * jump;
+            let meet = if is_smooth { lo.0 - lo.2 * width / (hi.2 - lo.2) } else { meet };
             let next = match is_low {
                 true => lo.0 + (further * (meet - lo.0)).max(reach),
                 false => hi.0 - (further * (hi.0 - meet)).max(reach),

@@ -5,7 +5,7 @@ mod adaptive;
 mod light_space;
 mod psm;
 
-pub(crate) use adaptive::Search;
+pub(crate) use adaptive::{Precision, Search};
 pub(crate) use light_space::{LightSpace, theta};
 pub(crate) use psm::psm;
 
@@ -190,7 +190,7 @@ impl OnePoint {
         view: &View<'_>,
         space: &LightSpace,
         camera: &Camera,
-        search: &mut Search,
+        (search, precision): (&mut Search, Precision),
     ) -> f64 {
         let strength = match warp {
             Warp::Uniform | Warp::Psm => 0.0,
@@ -202,7 +202,7 @@ impl OnePoint {
                 // still better than no warp.
                 let phi = camera.tan_half_fov_y().atan();
                 let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
-                search.least_error(self, view, objective) * fade
+                search.least_error(self, view, objective, precision) * fade
             }
             Warp::Lispsm => self.along_view(space, |view| {
                 let f = view.n + (view.f - view.n).min(view.mu_metres * view.sin_theta);
