@@ -49,7 +49,10 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let camera = Camera::look_at(v.look_at([480, 270])).unwrap();
     let light = scene.default_light().light;
     let boxes = tracer.boxes(256);
-    let bounds = Bounds { receiver_parts: Some(&umbrage::BoxTree::new(&boxes).unwrap()), ..Bounds::of_scene(scene.bounds()) };
+    let bounds = Bounds {
+        receiver_parts: Some(&umbrage::BoxTree::new(&boxes).unwrap()),
+        ..Bounds::of_scene(scene.bounds())
+    };
     let plan_for = |filter| {
         let technique = Technique { warp: Warp::Uniform, filter, ..Technique::default() };
         Planner::new().plan(&camera, &[light], &bounds, &technique).unwrap().clone()

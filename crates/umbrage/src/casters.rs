@@ -87,9 +87,12 @@ pub(crate) fn outer_points(outer: &mut Vec<u32>, points: &[Seen]) {
     let next = |i: usize| corners[(i + 1) % 8] - corners[i];
     let normals: [DVec2; 8] = std::array::from_fn(|i| next(i).perp());
     let (nx, nz) = (normals.map(|n| n.x), normals.map(|n| n.y));
-    let least: [f64; 8] = std::array::from_fn(|i| {
-        if next(i) == DVec2::ZERO { -1.0 } else { normals[i].dot(corners[i]) }
-    });
+    let least: [f64; 8] =
+        std::array::from_fn(
+            |i| {
+                if next(i) == DVec2::ZERO { -1.0 } else { normals[i].dot(corners[i]) }
+            },
+        );
     let is_inside = |p: DVec2| {
         let inside: [bool; 8] = std::array::from_fn(|i| nx[i] * p.x + nz[i] * p.y > least[i]);
         inside.iter().fold(true, |all, &is| all & is)

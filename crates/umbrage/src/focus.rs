@@ -98,11 +98,9 @@ impl Body {
         self.push_hexahedron([a, b, c, d, e, f, g, h]);
     }
 
-    /// Appends a box (local space), given by its [`sides`](Self::sides).
-    pub(crate) fn push_box(&mut self, sides: [Plane; 6]) {
-        let min = DVec3::from([0, 2, 4].map(|i| -sides[i].offset));
-        let max = DVec3::from([1, 3, 5].map(|i| sides[i].offset));
-        self.push_hexahedron(Aabb { min, max }.corners());
+    /// Appends a box (local space).
+    pub(crate) fn push_box(&mut self, aabb: Aabb) {
+        self.push_hexahedron(aabb.corners());
     }
 
     /// Appends a convex hexahedron, whose corners (local space) are numbered as those of
@@ -151,7 +149,7 @@ impl Body {
 
     /// The planes around a box, thick enough to clip this body.
     pub(crate) fn sides(&self, aabb: Aabb) -> [Plane; 6] {
-        sides(aabb, self.size)
+        planes_around(thickened(aabb, self.size))
     }
 
     /// Removes what lies outside any of the planes.
@@ -281,12 +279,7 @@ struct SidesOf {
 }
 
 /// Sets the distances of all vertices from a plane.
-fn set_distances(
-    distances: &mut Vec<f64>,
-    vertices: &[DVec3],
-    plane: Plane,
-    size: f64,
-) -> SidesOf {
+fn set_distances(distances: &mut Vec<f64>, vertices: &[DVec3], plane: Plane, size: f64) -> SidesOf {
     // Vertices this close to the plane count as on it, so that no slivers arise from rounding.
     let tolerance = 1e-13 * size.max(plane.offset.abs());
     let (mut has_inside, mut has_outside) = (false, false);
@@ -344,18 +337,23 @@ impl Polyhedron {
     }
 }
 
-/// The planes around a box (local space), thick enough to clip a body of this size, metres.
-pub(crate) fn sides(aabb: Aabb, size: f64) -> [Plane; 6] {
+/// A box (local space), thick enough to clip a body of this size, metres.
+pub(crate) fn thickened(aabb: Aabb, size: f64) -> Aabb {
     // A flat box, such as a ground plane, gets a thickness far below the resolution of single
     // precision at its distance, so that the clipped body has an inside.
     let farthest = aabb.min.abs().max(aabb.max.abs()).max_element();
     let pad = 1e-7 * farthest.min(size);
+    Aabb { min: aabb.min - pad, max: aabb.max + pad }
+}
+
+/// The planes around a box, with their insides towards it.
+fn planes_around(aabb: Aabb) -> [Plane; 6] {
     std::array::from_fn(|i| {
         let axis = DVec3::AXES[i / 2];
         if i % 2 == 0 {
-            Plane { normal: axis, offset: pad - axis.dot(aabb.min) }
+            Plane { normal: axis, offset: -axis.dot(aabb.min) }
         } else {
-            Plane { normal: -axis, offset: pad + axis.dot(aabb.max) }
+            Plane { normal: -axis, offset: axis.dot(aabb.max) }
         }
     })
 }
@@ -365,10 +363,8 @@ pub(crate) fn frustum_planes(camera: &Camera) -> [Plane; 6] {
     let forward = camera.forward();
     let rays = camera.corners_at(1.0);
     // The side planes pass through the eye exactly.
-    let side = |i: usize| Plane {
-        normal: rays[(i + 1) % 4].cross(rays[i]).normalize(),
-        offset: 0.0,
-    };
+    let side =
+        |i: usize| Plane { normal: rays[(i + 1) % 4].cross(rays[i]).normalize(), offset: 0.0 };
     [
         Plane { normal: forward, offset: -camera.near() },
         Plane { normal: -forward, offset: camera.far() },
@@ -522,10 +518,10 @@ mod tests {
             for &aabb in &boxes {
                 // Without padding, boxes of the lattice touch its planes.
                 let is_flat = aabb.size().min_element() == 0.0;
-                let sides = if is_flat { view.sides(aabb) } else { Body::default().sides(aabb) };
-                together.push_box(sides);
+                let aabb = if is_flat { thickened(aabb, view.size()) } else { aabb };
+                together.push_box(aabb);
                 let mut part = Body::default();
-                part.push_box(sides);
+                part.push_box(aabb);
                 prop_assert_eq!(closed_surfaces(&part)?, 1);
                 cuts.iter().for_each(|&cut| part.clip(&[cut]));
                 closed_surfaces(&part)?;

@@ -3,6 +3,7 @@
 use crate::bounds::Plane;
 use crate::camera::Camera;
 use crate::light::Projector;
+use crate::math::range;
 use crate::plan::Face;
 use crate::technique::{Partition, Splits};
 use glam::{DVec3, DVec4};
@@ -199,89 +200,143 @@ pub(crate) fn split(
     ends
 }
 
-/// The ratio of the largest storage of a fitted slice to the least with which the search ends.
-const ALIKE: f64 = 1.09;
+/// The ratio of the largest storage of a fitted slice to the least from which one more step makes
+/// them alike.
+const NEARLY_ALIKE: f64 = 1.03;
 
-/// The share of the best ratio so far that a useful round attains at most. The search ends after two
+/// The share of the best ratio so far that a useful round attains at most. The search ends after three
 /// rounds that are of no use.
-const USEFUL: f64 = 0.95;
+const USEFUL: f64 = 0.97;
 
 /// The largest number of times that all slices are tried.
-const MOST_ROUNDS: usize = 6;
+const MOST_ROUNDS: usize = 16;
+
+/// The largest number of ends between slices.
+const MOST_ENDS: usize = Partition::MAX_SLICES - 1;
 
 /// Moves all but the first and the last end so that all slices need similar storage.
 ///
-/// Let x be the logarithm of a slice's range, its far end over its near end. Where receivers fill
-/// the view, the storage of an even map grows as e²ˣ − eˣ, and that of others more slowly. In each
-/// round every slice's ln x is a secant away from the storage that all would share. Storage can jump
-/// where a slice reaches a receiver, and then no ends may be right; of all ends tried, those whose
-/// storages differ least are taken.
+/// The unknowns are the logarithms of the ends, and what shall vanish are the differences between
+/// the logarithms of neighbouring storages. They are found by Broyden's method (1965). Storage can
+/// jump where a slice reaches a receiver, and then no ends may be right; of all ends tried, those
+/// whose storages differ least are taken.
 fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
     let k = ends.len() - 1;
     let [n, f] = [ends[0], ends[k]];
     if k == 1 || f <= n {
         return;
     }
+    let unknowns = k - 1;
     let whole = (f / n).ln();
-    let mut lengths = [whole / k as f64; Partition::MAX_SLICES];
-    let mut best = (f64::INFINITY, Ends::default());
+    let mut at: [f64; MOST_ENDS] =
+        std::array::from_fn(|i| n.ln() + whole * (i + 1) as f64 / k as f64);
+    let mut jacobian = model(whole / k as f64, unknowns);
+    let mut best = (f64::INFINITY, at);
     let mut useless = 0;
-    // Lengths and storages of the last round, as logarithms.
-    let mut last: Option<[[f64; 2]; Partition::MAX_SLICES]> = None;
+    let mut last: Option<[[f64; MOST_ENDS]; 2]> = None;
     for _ in 0..MOST_ROUNDS {
-        for i in 1..k {
-            ends[i] = (ends[i - 1] * lengths[i - 1].exp()).min(f);
+        set_ends(ends, &at);
+        let mut needed = [0.0; Partition::MAX_SLICES];
+        for (i, needed) in needed.iter_mut().enumerate().take(k) {
+            *needed = storage(ends[i], ends[i + 1]);
         }
-        let mut tried = [[0.0; 2]; Partition::MAX_SLICES];
-        let mut extremes = (f64::INFINITY, 0f64);
-        for (i, slice) in tried.iter_mut().enumerate().take(k) {
-            let needed = storage(ends[i], ends[i + 1]);
-            extremes = (extremes.0.min(needed), extremes.1.max(needed));
-            *slice = [lengths[i].ln(), needed];
-        }
-        let ratio = extremes.1 / extremes.0;
+        let (least, most) = range(needed[..k].iter().copied());
+        let ratio = most / least;
         useless = if ratio < USEFUL * best.0 { 0 } else { useless + 1 };
         if ratio < best.0 || best.0.is_infinite() {
-            best.0 = ratio;
-            best.1[..=k].copy_from_slice(ends);
+            best = (ratio, at);
         }
-        if ratio <= ALIKE || extremes.1 == 0.0 || useless == 2 {
+        if most == 0.0 || useless == 3 {
             break;
         }
         // An empty slice counts as one that needs next to nothing.
-        let least = 1e-2 * extremes.1;
-        tried.iter_mut().take(k).for_each(|slice| slice[1] = slice[1].max(least).ln());
-        // d ln(storage)/d ln(length) of each slice.
-        let mut growth = [0.0; Partition::MAX_SLICES];
-        for i in 0..k {
-            let even = lengths[i] * (2.0 + 1.0 / lengths[i].exp_m1());
-            growth[i] = 0.5 * (1.0 + even);
-            if let Some(last) = last {
-                let [dx, ds] = [0, 1].map(|j| tried[i][j] - last[i][j]);
-                if dx.abs() > 1e-3 {
-                    growth[i] = (ds / dx).clamp(0.5, 2.0 * even);
-                }
+        let logarithm = |i: usize| needed[i].max(1e-2 * most).ln();
+        let difference: [f64; MOST_ENDS] =
+            std::array::from_fn(
+                |i| {
+                    if i < unknowns { logarithm(i) - logarithm(i + 1) } else { 0.0 }
+                },
+            );
+        if let Some([last_at, last_difference]) = last {
+            // The Jacobian is changed along the last step alone, so that it explains this step.
+            let step: [f64; MOST_ENDS] = std::array::from_fn(|j| at[j] - last_at[j]);
+            let length: f64 = step[..unknowns].iter().map(|s| s * s).sum();
+            for (i, row) in jacobian.iter_mut().enumerate().take(unknowns) {
+                let explained: f64 = (0..unknowns).map(|j| row[j] * step[j]).sum();
+                let rest = (difference[i] - last_difference[i] - explained) / length;
+                (0..unknowns).for_each(|j| row[j] += rest * step[j]);
             }
         }
-        // The shared storage is the one at which the lengths add up.
-        let total = |level: f64| -> f64 {
-            (0..k).map(|i| (tried[i][0] + step(level - tried[i][1], growth[i])).exp()).sum()
-        };
-        let (mut lo, mut hi) = (least.ln(), extremes.1.ln());
-        for _ in 0..30 {
-            let middle = lo.midpoint(hi);
-            if total(middle) < whole { lo = middle } else { hi = middle }
-        }
-        let level = lo.midpoint(hi);
+        last = Some([at, difference]);
+        let step = solve(jacobian, difference, unknowns);
+        // No slice gives more than half of its length away in one step.
+        let mut share = 1f64;
         for i in 0..k {
-            lengths[i] = (tried[i][0] + step(level - tried[i][1], growth[i])).exp();
+            let moves = |j: usize| if (1..k).contains(&j) { step[j - 1] } else { 0.0 };
+            let shorter = moves(i) - moves(i + 1);
+            let length = (ends[i + 1] / ends[i]).ln();
+            if -shorter > 0.5 * length {
+                share = share.min(0.5 * length / -shorter);
+            }
         }
-        last = Some(tried);
+        (0..unknowns).for_each(|i| at[i] -= share * step[i]);
+        if ratio <= NEARLY_ALIKE || !at.iter().all(|x| x.is_finite()) {
+            break;
+        }
     }
-    ends[..k].copy_from_slice(&best.1[..k]);
+    // The last step, from slices that are nearly alike, is not tried. It also keeps slices from
+    // jumping where the number of rounds changes.
+    let is_sound = best.0 <= NEARLY_ALIKE && at.iter().all(|x| x.is_finite());
+    set_ends(ends, if is_sound { &at } else { &best.1 });
 }
 
-/// The change of a slice's ln length for a change of its ln storage.
-fn step(change: f64, growth: f64) -> f64 {
-    (change / growth).clamp(-1.5, 1.5)
+/// Sets all but the first and the last end from their logarithms.
+fn set_ends(ends: &mut [f64], logarithms: &[f64]) {
+    let k = ends.len() - 1;
+    for i in 1..k {
+        ends[i] = logarithms[i - 1].exp().clamp(ends[i - 1], ends[k]);
+    }
+}
+
+/// The derivatives of the differences between the logarithms of neighbouring storages, with respect
+/// to the logarithms of the ends. They are those of slices whose far ends are eˣ times their near
+/// ends: where receivers fill the view, the storage of an even map grows as e²ˣ − eˣ, and that of a
+/// warped one more slowly.
+fn model(x: f64, unknowns: usize) -> [[f64; MOST_ENDS]; MOST_ENDS] {
+    let even = 2.0 + 1.0 / x.exp_m1();
+    let growth = 0.5 * (even + 1.0 / x);
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| match i.abs_diff(j) {
+            0 => 2.0 * growth,
+            1 if i.max(j) < unknowns => -growth,
+            _ => 0.0,
+        })
+    })
+}
+
+/// The solution of a system of linear equations, by elimination with pivots.
+fn solve(
+    mut matrix: [[f64; MOST_ENDS]; MOST_ENDS],
+    mut right: [f64; MOST_ENDS],
+    unknowns: usize,
+) -> [f64; MOST_ENDS] {
+    for column in 0..unknowns {
+        let largest =
+            |&i: &usize, &j: &usize| matrix[i][column].abs().total_cmp(&matrix[j][column].abs());
+        let pivot = (column..unknowns).max_by(largest).unwrap_or(column);
+        matrix.swap(column, pivot);
+        right.swap(column, pivot);
+        for row in column + 1..unknowns {
+            let factor = matrix[row][column] / matrix[column][column];
+            for j in column..unknowns {
+                matrix[row][j] -= factor * matrix[column][j];
+            }
+            right[row] -= factor * right[column];
+        }
+    }
+    for row in (0..unknowns).rev() {
+        let known: f64 = (row + 1..unknowns).map(|j| matrix[row][j] * right[j]).sum();
+        right[row] = (right[row] - known) / matrix[row][row];
+    }
+    right
 }

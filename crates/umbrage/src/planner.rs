@@ -1,7 +1,7 @@
 use crate::bounds::{Aabb, Bounds, Plane};
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::focus::{Body, frustum_planes, sides};
+use crate::focus::{Body, frustum_planes, thickened};
 use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
@@ -187,11 +187,11 @@ impl Planner {
             let size = view.size();
             view.clear();
             for aabb in self.opening.boxes() {
-                let sides = sides(aabb, size);
+                let aabb = thickened(aabb, size);
                 self.cell.clear();
                 self.cell.extend(self.around.iter().filter(|p| !p.contains(aabb)));
                 part.clear();
-                part.push_box(sides);
+                part.push_box(aabb);
                 view.append_clipped(part, &self.cell);
             }
         }

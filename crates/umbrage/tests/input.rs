@@ -6,8 +6,8 @@ use common::{STABLE, WARPS, map_count, planner, possible, technique};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
-    Aabb, BoxTree, Bounds, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt, Partition, Plan,
-    Planner, PointLight, Size, Splits, SpotLight, Technique, Warp,
+    Aabb, Bounds, BoxTree, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt,
+    Partition, Plan, Planner, PointLight, Size, Splits, SpotLight, Technique, Warp,
 };
 
 const VIEW: LookAt = LookAt {

@@ -21,7 +21,11 @@ fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
         1 => Just(PartialBox::SameAsLast),
         1 => Just(PartialBox::OutOfSight),
     ];
-    prop::collection::vec(some, 1..12)
+    // Of the longer lists, some boxes are served in groups.
+    prop_oneof![
+        9 => prop::collection::vec(some.clone(), 1..12),
+        1 => prop::collection::vec(some, 40..160),
+    ]
 }
 
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use crate::aliasing::Local;
 use crate::bounds::{Aabb, Bounds};
 use crate::camera::Camera;
 use crate::error::Error;
-use crate::focus::Body;
+use crate::focus::{Body, thickened};
 use crate::math::range;
 use crate::matrices::MARGIN_TEXELS;
 use crate::plan::{ShadowMap, Slab};
@@ -77,7 +77,7 @@ impl Finishing {
     fn nearest_caster(&mut self, map: &ShadowMap, draft: &Draft, casters: Aabb) -> f64 {
         let body = &mut self.casters;
         body.clear();
-        body.push_box(draft.body.sides(casters.relative_to(map.origin)));
+        body.push_box(thickened(casters.relative_to(map.origin), draft.body.size()));
         // The depths of a stable map must not depend on the view, as its caster planes do.
         if draft.stable.is_none() {
             body.clip(&map.caster_planes);

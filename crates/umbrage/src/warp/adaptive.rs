@@ -8,7 +8,7 @@ const FEW: usize = 40;
 const RANGES: usize = 32;
 
 /// The largest number of steps after the coarse scan.
-const MOST_STEPS: usize = 24;
+const MOST_STEPS: usize = 40;
 
 /// How precisely a strength is searched for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,8 +90,9 @@ impl Search {
         };
         // For warps stronger than the view's own perspective every error grows.
         let end = (family.farthest / family.nearest).ln() + 1.0;
-        const STEPS: usize = 6;
-        let scan: [Cost; STEPS + 1] = std::array::from_fn(|i| cost(end * (i as f64) / STEPS as f64));
+        const STEPS: usize = 8;
+        let scan: [Cost; STEPS + 1] =
+            std::array::from_fn(|i| cost(end * (i as f64) / STEPS as f64));
         let best = scan.iter().enumerate().min_by(|a, b| a.1.value.total_cmp(&b.1.value));
         let best = best.map_or(0, |(i, _)| i);
         let [mut lo, mut hi] = [best.saturating_sub(1), (best + 1).min(STEPS)]
@@ -136,9 +137,8 @@ impl Search {
         let nu = omega.exp_m1();
         // The minimum may be at the bracket's lower end: no warp. The front may stand for points
         // that do not exist, so the points themselves decide.
-        let exact = |nu: f64| {
-            Cost::of(family, nu, view, objective, view.seen.iter().map(Front::of)).value
-        };
+        let exact =
+            |nu: f64| Cost::of(family, nu, view, objective, view.seen.iter().map(Front::of)).value;
         if exact(0.0) <= exact(nu) { 0.0 } else { nu }
     }
 
@@ -232,10 +232,9 @@ impl Cost {
                         + preference / (1.0 + preference) * (2.0 * t.1 - 1.0),
                 }
             }
-            Objective::Area => Self {
-                value: width * per_row * area.0,
-                slope: of_width - 1.0 + 3.0 * area.1,
-            },
+            Objective::Area => {
+                Self { value: width * per_row * area.0, slope: of_width - 1.0 + 3.0 * area.1 }
+            }
         }
     }
 }

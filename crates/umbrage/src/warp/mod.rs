@@ -118,11 +118,7 @@ impl Shape {
     /// distance from the axis. All its lengths are the longest where both arguments are largest.
     pub(crate) fn texel_over_w(&self, w: f64, off_axis: f64, [s, t]: [f64; 2]) -> Texel {
         let per_t = (self.t_per_z * t).recip();
-        Texel {
-            base: self.width / s,
-            shear: off_axis * self.per_z * per_t,
-            height: w * per_t,
-        }
+        Texel { base: self.width / s, shear: off_axis * self.per_z * per_t, height: w * per_t }
     }
 
     /// The homography from (x, z) to (s, t).
