@@ -78,7 +78,7 @@ fn one_box() -> Case {
 }
 
 fn planning(criterion: &mut Criterion) {
-    let light = Light::Directional { direction: DVec3::new(-0.57923, -0.70711, -0.40558) };
+    let light = Light::Directional { direction: DVec3::new(-0.579, -0.707, -0.406) };
     let mut cases: Vec<Case> = THIRD_PARTY.into_iter().filter_map(third_party).collect();
     cases.push(one_box());
     cases.extend([16, 48, 96].map(|count| scattered(count, 100.0)));
