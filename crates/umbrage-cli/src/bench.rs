@@ -10,7 +10,7 @@ use std::time::Instant;
 use umbrage::{Bounds, Plan, Planner};
 use umbrage_lab::{
     Bencher, Costs, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
-    choose_light, choose_view, milliseconds, planner,
+    choose_light, choose_view, milliseconds, plan, plan_with, planner,
 };
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
@@ -44,6 +44,9 @@ struct ResultJson {
     /// Draws and triangles of each map, in a frame that draws all maps.
     map_draws: Vec<DrawnJson>,
     ms: TimesJson,
+    /// What the shadows cost: `plan` + `depth` + `filter` + `shade` − `shade_none` of each frame,
+    /// milliseconds.
+    cost: Option<Spread>,
     /// Times of the very first frame.
     first_ms: FirstJson,
 }
@@ -61,6 +64,8 @@ struct TimesJson {
     depth: Option<Spread>,
     filter: Option<Spread>,
     shade: Option<Spread>,
+    /// `shade` of the same backend without shadows, in the same turns.
+    shade_none: Option<Spread>,
     frame: Option<Spread>,
 }
 
@@ -102,6 +107,10 @@ struct Contender<'a> {
     frames: Vec<Frame>,
 }
 
+/// The same frame without shadows. No GPU draws the second one, so it is compared with techniques
+/// that the reference renders beside a GPU.
+const WITHOUT_SHADOWS: [&str; 2] = ["none", "log:none"];
+
 /// The times of one frame, milliseconds.
 struct Frame {
     plan: f64,
@@ -124,16 +133,26 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let bounds = receivers.bounds();
     tell_notices(&scene);
     announce(&executors);
-    let mut contenders = Vec::new();
-    for technique in techniques {
-        let bencher = Bencher::new(&render_scene, technique.technique(), camera.image())?;
-        contenders.push(Contender { technique, bencher, planner: planner(), frames: Vec::new() });
+    let contender = |technique| Contender::new(&render_scene, technique, camera.image());
+    let mut contenders = techniques.iter().map(contender).collect::<Result<Vec<_>>>()?;
+    let without_shadows = WITHOUT_SHADOWS.map(str::parse::<NamedTechnique>);
+    for technique in &without_shadows {
+        let none = contender(technique.as_ref().map_err(Clone::clone)?)?;
+        let is_needed = contenders.iter().any(|c| c.is_gpu() == none.is_gpu());
+        if is_needed && none_for(&contenders, none.is_gpu()).is_none() {
+            contenders.push(none);
+        }
     }
     take_turns(&mut contenders, args, &view, &bounds, quiet)?;
-    let results = contenders.iter_mut().map(|contender| {
-        let device = executors.device().filter(|_| contender.bencher.executor().is_gpu());
-        contender.result(&scene, &view, &bounds, device)
+    let results = contenders.iter().map(|contender| {
+        let none = none_for(&contenders, contender.is_gpu()).context("frames without shadows")?;
+        let device = executors.device().filter(|_| contender.is_gpu());
+        contender.result(none, &scene, &view, &bounds, device)
     });
+    let mut results = results.collect::<Result<Vec<_>>>()?;
+    if args.json {
+        results.truncate(techniques.len());
+    }
     let bench = BenchJson {
         scene: scene.name.clone(),
         size: camera.image(),
@@ -141,7 +160,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
         light: chosen_light.info(),
         frames: args.frames,
         still: args.still,
-        results: results.collect::<Result<_>>()?,
+        results,
     };
     if args.json {
         print(&format!("{}\n", serde_json::to_string_pretty(&bench)?))
@@ -168,7 +187,7 @@ fn take_turns(
             bar.stage(&contender.technique.to_string());
             let start = Instant::now();
             let Contender { technique, bencher, planner, frames } = contender;
-            let plan = made(planner, technique, view, bounds)?;
+            let plan = plan_with(planner, technique, view.camera(), view.light(), bounds)?;
             let planned = milliseconds(start);
             let costs = bencher.frame(view, plan, args.still)?;
             frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
@@ -179,21 +198,53 @@ fn take_turns(
     Ok(())
 }
 
-impl Contender<'_> {
-    /// The results of this technique, over the frames that count.
+/// The contender that draws the same frames without shadows, on a GPU or not.
+fn none_for<'a, 'b>(contenders: &'b [Contender<'a>], is_gpu: bool) -> Option<&'b Contender<'a>> {
+    contenders.iter().find(|c| c.is_gpu() == is_gpu && !c.technique.technique().filter.has_maps())
+}
+
+impl<'a> Contender<'a> {
+    fn new(
+        scene: &'a RenderScene<'_>,
+        technique: &'a NamedTechnique,
+        size: [u32; 2],
+    ) -> Result<Self> {
+        let bencher = Bencher::new(scene, technique.technique(), size)?;
+        Ok(Self { technique, bencher, planner: planner(), frames: Vec::new() })
+    }
+
+    fn is_gpu(&self) -> bool {
+        self.bencher.executor().is_gpu()
+    }
+
+    /// The frames that count.
+    fn counted(&self) -> impl Iterator<Item = &Frame> {
+        self.frames.iter().skip(WARM_UP as usize)
+    }
+
+    /// The spread of a time over the frames that count; `None` if it is not measured.
+    fn spread(&self, value: fn(&Frame) -> Option<f64>) -> Option<Spread> {
+        Spread::of(self.counted().filter_map(value))
+    }
+
+    /// The results of this technique, over the frames that count. `none` has the frames without
+    /// shadows.
     fn result(
-        &mut self,
+        &self,
+        none: &Contender<'_>,
         scene: &Scene,
         view: &umbrage_trace::View<'_>,
         bounds: &Bounds<'_>,
         device: Option<String>,
     ) -> Result<ResultJson> {
-        let Self { technique, bencher, planner, frames } = self;
-        let plan = made(planner, technique, view, bounds)?;
+        let Self { technique, bencher, frames, .. } = self;
+        let plan = &plan(technique, view.camera(), view.light(), bounds)?;
         let first = frames.first().context("frames")?;
-        let counted = &frames[WARM_UP as usize..];
-        let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
-        let filter: Option<Vec<f64>> = counted.iter().map(|f| f.costs.filter).collect();
+        let cost = |(frame, none): (&Frame, &Frame)| {
+            let Frame { plan, costs, .. } = frame;
+            let lookup = costs.shade - none.costs.shade;
+            plan + costs.depth + costs.filter.unwrap_or(0.0) + lookup
+        };
         Ok(ResultJson {
             shadows: technique.to_string(),
             backend: bencher.executor().name(),
@@ -205,26 +256,18 @@ impl Contender<'_> {
             storage_factor: plan.storage_factor(),
             map_draws: map_draws(plan, &first.costs, scene),
             ms: TimesJson {
-                plan: spread(|f| f.plan),
-                depth: spread(|f| f.costs.depth),
-                filter: filter.and_then(|values| Spread::of(values.into_iter())),
-                shade: spread(|f| f.costs.shade),
-                frame: spread(|f| f.frame),
+                plan: self.spread(|f| Some(f.plan)),
+                depth: self.spread(|f| Some(f.costs.depth)),
+                filter: self.spread(|f| f.costs.filter),
+                shade: self.spread(|f| Some(f.costs.shade)),
+                shade_none: none.spread(|f| Some(f.costs.shade)),
+                frame: self.spread(|f| Some(f.frame)),
             },
+            // Frames of the same turn are compared, as both see what else the machine does then.
+            cost: Spread::of(self.counted().zip(none.counted()).map(cost)),
             first_ms: FirstJson { depth: first.costs.depth, frame: first.frame },
         })
     }
-}
-
-/// Computes the plan of a technique.
-fn made<'a>(
-    planner: &'a mut Planner,
-    technique: &NamedTechnique,
-    view: &umbrage_trace::View<'_>,
-    bounds: &Bounds<'_>,
-) -> Result<&'a Plan> {
-    let plan = planner.plan(view.camera(), &[*view.light()], bounds, technique.technique());
-    Ok(plan.map_err(|e| technique.blame(e))?)
 }
 
 /// What a frame draws into each map: the GPU renderer's own counts, or without them the number of
@@ -256,6 +299,7 @@ fn table(bench: &BenchJson) -> String {
         "depth",
         "filter",
         "shade",
+        "cost",
         "frame",
         "first frame",
         "maps",
@@ -277,6 +321,7 @@ fn table(bench: &BenchJson) -> String {
             ms(r.ms.depth, 2),
             ms(r.ms.filter, 2),
             ms(r.ms.shade, 2),
+            ms(r.cost, 2),
             ms(r.ms.frame, 2),
             format!("{:.2}", r.first_ms.frame),
             r.maps.to_string(),

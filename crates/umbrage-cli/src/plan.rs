@@ -151,7 +151,7 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
         .map_err(|e| technique.blame(e))?;
     let planned = Planned::new(plan, max_side, technique, &view, &chosen, scene.as_ref());
     if args.json {
-        if plan.maps.iter().all(ShadowMap::is_empty) {
+        if !plan.maps.is_empty() && plan.maps.iter().all(ShadowMap::is_empty) {
             log::warn!("{}", nothing_served(&view));
         }
         print(&format!("{}\n", serde_json::to_string_pretty(&planned.json())?))

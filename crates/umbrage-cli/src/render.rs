@@ -53,7 +53,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
     let bounds = receivers.bounds();
-    let (plan, _) = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
+    let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(args.aov);
     if needs.motion {
         Motion::Away.check(FRAMES, chosen.look_at, light)?;

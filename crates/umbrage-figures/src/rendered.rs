@@ -41,7 +41,7 @@ impl<'a> Shot<'a> {
     /// Renders the picture with a technique that is written as on the command line.
     pub(crate) fn picture(&self, technique: &str) -> Result<Image<Rgb>> {
         let technique: NamedTechnique = technique.parse()?;
-        let (plan, _) = umbrage_lab::plan(&technique, &self.camera, &self.light, &self.bounds)?;
+        let plan = umbrage_lab::plan(&technique, &self.camera, &self.light, &self.bounds)?;
         let reference = Reference::render(self.tracer, &plan, &|_| {})?;
         // One sample at the centre of each pixel, as renderers shade.
         let view = View::new(self.tracer, self.camera, self.light, 1)?;

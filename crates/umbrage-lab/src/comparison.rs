@@ -97,7 +97,7 @@ impl<'a> Comparison<'a> {
         let view = View::new(prepared.render.tracer(), camera, light, options.samples)
             .about(Field::Samples)?;
         let bounds = prepared.receivers.bounds();
-        let plan = |t| planning::plan(t, &camera, &light, &bounds);
+        let plan = |t| planning::timed_plan(t, &camera, &light, &bounds);
         let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;
         Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
     }

@@ -189,6 +189,22 @@ impl<'g, 's> Renderer<'g, 's> {
         options: &ShadowOptions,
         support: Support,
     ) -> Result<Self, Error> {
+        Self::with_lookup(gpu, scene, options, support, |wgsl| wgsl)
+    }
+
+    /// Like [`with_support`](Self::with_support), with another lookup: `change` makes its text from
+    /// that of [`Shadows::lookup_wgsl`]. So lookups can be compared in one run, with all else the
+    /// same.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_lookup(
+        gpu: &'g Gpu,
+        scene: &'g SceneBuffers<'s>,
+        options: &ShadowOptions,
+        support: Support,
+        change: impl FnOnce(String) -> String,
+    ) -> Result<Self, Error> {
         let device = gpu.device();
         let shadows = Shadows::new(device, support, options)?;
         let [positions, instances] = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
@@ -221,7 +237,7 @@ impl<'g, 's> Renderer<'g, 's> {
         let (view_buffer, view_layout, view_group) = view_bindings(device);
         let shader = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("forward"),
-            source: ShaderSource::Wgsl(shader_text(&shadows).into()),
+            source: ShaderSource::Wgsl(shader_text(&change(shadows.lookup_wgsl(1))).into()),
         });
         let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("forward"),
@@ -534,8 +550,8 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 }
 
 /// The forward shader, after the lookup module that it calls.
-fn shader_text(shadows: &Shadows) -> String {
-    shadows.lookup_wgsl(1) + "\n" + include_str!("wgsl/forward.wgsl")
+fn shader_text(lookup: &str) -> String {
+    format!("{lookup}\n{}", include_str!("wgsl/forward.wgsl"))
 }
 
 fn pipelines(

@@ -54,11 +54,13 @@ impl Timer {
         Timestamps { depth: Some(self.writes(0)), filter: Some(self.writes(4)) }
     }
 
-    pub(crate) fn shade_pass(&self) -> RenderPassTimestampWrites<'_> {
+    /// The timestamps of the pass that draws a picture.
+    pub fn shade_pass(&self) -> RenderPassTimestampWrites<'_> {
         self.writes(2)
     }
 
-    pub(crate) fn resolve(&self, encoder: &mut CommandEncoder) {
+    /// Makes the timestamps readable, after the passes that they are about.
+    pub fn resolve(&self, encoder: &mut CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..COUNT, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
     }

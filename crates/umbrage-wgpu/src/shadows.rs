@@ -174,7 +174,7 @@ impl Shadows {
             .map_err(|e| Error::Invalid { field: "options.filter", problem: e.to_string() })?;
         let is_spread = match options.filter {
             Filter::Spread { .. } | Filter::Pcss { .. } => true,
-            Filter::Hard | Filter::Pcf { .. } | Filter::Prefiltered(_) => false,
+            Filter::None | Filter::Hard | Filter::Pcf { .. } | Filter::Prefiltered(_) => false,
         };
         if is_spread && !support.depth_fetch {
             return Err(Error::Unsupported {
@@ -193,9 +193,11 @@ impl Shadows {
         let filter_mode = match options.filter {
             Filter::Prefiltered(_) => FilterMode::Linear,
             Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
-            Filter::Hard | Filter::Pcf { .. } | Filter::Spread { .. } | Filter::Pcss { .. } => {
-                FilterMode::Nearest
-            }
+            Filter::None
+            | Filter::Hard
+            | Filter::Pcf { .. }
+            | Filter::Spread { .. }
+            | Filter::Pcss { .. } => FilterMode::Nearest,
         };
         let sampler = device.create_sampler(&SamplerDescriptor {
             label: Some("shadow sampler"),
@@ -438,8 +440,11 @@ impl Shadows {
     }
 
     /// Memory of the textures that lookup samples, bytes: the depth texture or, with a prefilter,
-    /// the prefiltered maps.
+    /// the prefiltered maps. 0 with [`Filter::None`].
     pub fn lookup_bytes(&self) -> u64 {
+        if !self.options.filter.has_maps() {
+            return 0;
+        }
         self.prefiltering.as_ref().map_or_else(|| self.texture_bytes(), Prefiltering::bytes)
     }
 

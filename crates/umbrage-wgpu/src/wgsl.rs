@@ -117,13 +117,17 @@ pub(crate) fn named(text: &str, name: &str) -> String {
 
 fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> Shader {
     let ShadowOptions { filter, comparison, layout } = *options;
-    let mut shader = Shader::new(module!("lookup"));
+    let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
+    let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
     shader.add([
         module!("maps"),
         if storage_buffers { module!("buffers/storage") } else { module!("buffers/uniform") },
         module!("receiver"),
     ]);
+    if !filter.has_maps() {
+        return shader;
+    }
     add_width(&mut shader, &filter);
     add_reach(&mut shader, &filter);
     let depths = match layout {
@@ -135,6 +139,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
         Layout::Layers => module!("texture/layers_compared"),
     };
     match (filter, comparison) {
+        (Filter::None, _) => {}
         (Filter::Hard, Comparison::PerTexel) => shader.add([depths, module!("filter/hard")]),
         (Filter::Hard, Comparison::Hardware) => {
             shader.add([compared, module!("hardware"), module!("filter/hardware_hard")]);
@@ -175,7 +180,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
 /// Adds the module that computes how many texels a filter's width covers.
 fn add_width(shader: &mut Shader, filter: &Filter) {
     let width = match filter {
-        Filter::Hard | Filter::Pcf { .. } => None,
+        Filter::None | Filter::Hard | Filter::Pcf { .. } => None,
         Filter::Spread { width, .. } => Some(*width),
         // The filter multiplies the metric of one metre by its own widths in metres.
         Filter::Pcss { .. } => Some(Width::Metres(1.0)),
@@ -201,6 +206,7 @@ fn add_width(shader: &mut Shader, filter: &Filter) {
 fn add_reach(shader: &mut Shader, filter: &Filter) {
     const HALF_DIAGONAL: f32 = std::f32::consts::FRAC_1_SQRT_2;
     let [texels, widths] = match filter {
+        Filter::None => [0.0; 2],
         Filter::Hard => [HALF_DIAGONAL, 0.0],
         Filter::Pcf { n } => [HALF_DIAGONAL * ((*n).clamp(1, Filter::MAX_PCF) + 1) as f32, 0.0],
         Filter::Spread { .. } => [HALF_DIAGONAL, HALF_DIAGONAL],

@@ -1,4 +1,5 @@
-//! Time to plan the maps of one light, by warp and partition.
+//! Time to plan the maps of one light in one box of receivers, by warp and partition. The bench
+//! `planning` of `umbrage-trace` has many boxes.
 #![allow(missing_docs, reason = "criterion's macros make undocumented items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -43,21 +44,6 @@ fn plan(c: &mut Criterion) {
             });
         });
     }
-    // Receivers as 256 boxes that stand on the ground, of which the view shows most.
-    let cell = scene.size() / DVec3::new(16.0, 1.0, 16.0);
-    let part = |i: usize| {
-        let corner = scene.min + cell * DVec3::new((i % 16) as f64, 0.0, (i / 16) as f64);
-        Aabb::new(corner, corner + cell * DVec3::new(0.8, 0.1 + (i % 7) as f64 / 8.0, 0.8))
-    };
-    let parts: Vec<Aabb> = (0..256).map(part).collect();
-    let bounds = Bounds { receiver_parts: Some(&tree), ..bounds };
-    let mut planner = Planner::new();
-    group.bench_function("adaptive, 256 boxes of receivers", |b| {
-        b.iter(|| {
-            let technique = Technique::default();
-            planner.plan(black_box(&camera), &[light], &bounds, &technique).unwrap().maps.len()
-        });
-    });
     group.finish();
 }
 

@@ -84,7 +84,8 @@ impl Plan {
     /// per texel in s and in t, in units of the image's height squared (Lloyd et al. 2006, Eq. 12,
     /// where images are square).
     pub fn storage_factor(&self) -> f64 {
-        self.maps.iter().map(|m| m.storage_factor).sum()
+        // The sum of no numbers is −0, which would print with its sign.
+        self.maps.iter().map(|m| m.storage_factor).sum::<f64>() + 0.0
     }
 
     /// A surface point with its tangent plane, as the map of index `map` sees it. `world_normal`

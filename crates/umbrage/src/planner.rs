@@ -207,7 +207,11 @@ impl Planner {
         }
         let with_near = technique.partition.faces == Faces::SidesAndNear;
         let faces = partition::LitFaces::new(camera, projector, with_near);
-        for &face in technique.partition.face_list() {
+        let faces_with_maps = match technique.filter.has_maps() {
+            true => technique.partition.face_list(),
+            false => &[],
+        };
+        for &face in faces_with_maps {
             self.cell.clear();
             let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
             let Bodies { view, lit, face: body } = &mut self.bodies;

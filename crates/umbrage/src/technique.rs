@@ -12,8 +12,8 @@ use crate::visibility::Filter;
 /// One way to make shadows: which maps there are, how their texels are spread over what they cover,
 /// and how the maps are looked up.
 ///
-/// A technique is also a text, `WARP[+zK][+face][:FILTER][@TEXELS]`, which can be parsed and
-/// printed; [`language`] lists its words:
+/// A technique is also a text, `WARP[+zK][+face][:FILTER][@TEXELS]` or `none`, which can be parsed
+/// and printed; [`language`] lists its words:
 ///
 /// ```
 /// use umbrage::{Partition, Size, Technique, visibility::Filter};

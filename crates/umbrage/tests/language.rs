@@ -71,6 +71,20 @@ fn defaults_are_one_adaptive_hard_map_of_a_million_texels() {
     }
 }
 
+/// `none` is a filter of any technique, and a technique by itself.
+#[test]
+fn none_needs_no_warp() {
+    let none = Technique { filter: Filter::None, ..Technique::default() };
+    assert_eq!((parsed("none"), none.to_string()), (none, "none".to_owned()));
+    assert_eq!((parsed("adaptive:none"), parsed("adaptive:none@1024")), (none, none));
+    let sliced = parsed("lispsm+z4:none@2048");
+    assert_eq!((sliced.filter, sliced.partition.slices), (Filter::None, 4));
+    assert_eq!(sliced.to_string(), "lispsm+z4:none@2048");
+    let explained = language::explain("none");
+    assert_eq!(explained.len(), 1, "{explained:?}");
+    assert_eq!(explained[0].0, "none");
+}
+
 /// Every word of the tables, with each of its options, parses, prints as it was written, is
 /// explained and is part of the help.
 #[test]
@@ -189,6 +203,11 @@ fn bad_techniques_say_what_would_be_right() {
         ("uniform@64x64x64", "from 1 to 65536"),
         ("uniform@1024:pcf3", "comes last"),
         ("uniform@1024+z2", "comes last"),
+        ("none@2048", "did you mean `none`?"),
+        ("none+z4", "`none` has no maps"),
+        ("none:pcf3", "`none` has no maps"),
+        ("nonne", "did you mean"),
+        ("uniform:non", "did you mean `none`?"),
     ] {
         let error = text.parse::<Technique>().unwrap_err().to_string();
         assert!(error.contains(expected), "{text:?}: {error}");
@@ -261,6 +280,7 @@ fn rust_code_makes_the_technique() -> Result<(), umbrage::Error> {
         };
     }
     check!("adaptive", Technique::default());
+    check!("none", Technique { filter: Filter::None, ..Technique::default() });
     check!(
         "adaptive+z4:pcf3@2048",
         Technique {
@@ -394,6 +414,7 @@ fn filter() -> impl Strategy<Value = Filter> {
         (0.001f32..1e6).prop_map(LightSize::Metres)
     ];
     prop_oneof![
+        Just(Filter::None),
         Just(Filter::Hard),
         (1u32..=15).prop_map(|n| Filter::Pcf { n }),
         (1u32..=15, width(), pattern).prop_map(|(n, width, (most, pattern))| Filter::Spread {

@@ -8,9 +8,10 @@ use common::{
 };
 use glam::DVec3;
 use proptest::prelude::*;
+use umbrage::visibility::Filter;
 use umbrage::{
-    Bounds, Camera, Error, Faces, Light, Limits, LookAt, Objective, Partition, Plan, Planner,
-    PointLight, ShadowMap, Size, Splits, Technique, Warp,
+    Atlas, Bounds, Camera, Error, Faces, Light, Limits, LookAt, Objective, Partition, Plan,
+    Planner, PointLight, ShadowMap, Size, Splits, Technique, Warp,
 };
 
 /// Warps under which the largest errors are known exactly.
@@ -54,6 +55,36 @@ fn spread(plan: &Plan, max_side: u32, least: u32) -> (f64, f64) {
         .filter(|m| m.resolution.iter().all(|n| (least..max_side).contains(n)))
         .flat_map(of_map)
         .fold((f64::INFINITY, 0f64), |(lo, hi), (_, e)| (lo.min(e), hi.max(e)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Without shadows there are no maps, whatever else a technique asks for, and everything else
+    /// of the plan is as it would be with maps.
+    #[test]
+    fn no_shadows_need_no_texels(
+        (config, lights) in suns(),
+        partition in partition(),
+        pick in 0..WARPS.len(),
+        size in prop_oneof![Just(Size::Budget(1)), Just(Size::Exact([64, 32])), Just(Size::MaxError(1.0))],
+    ) {
+        let (_, spread) = WARPS[pick];
+        let shadowed = Technique { partition: possible(partition, spread), ..technique(spread) };
+        let with_maps = plan(&config, &lights, &shadowed);
+        let without = plan(&config, &lights, &Technique { size, filter: Filter::None, ..shadowed });
+        prop_assert_eq!((without.maps.len(), without.texels()), (0, 0));
+        prop_assert_eq!(without.storage_factor().to_string(), "0");
+        prop_assert_eq!(without.origin, with_maps.origin);
+        prop_assert_eq!(without.lights.len(), lights.len());
+        for (a, b) in without.lights.iter().zip(&with_maps.lights) {
+            prop_assert_eq!((a.maps.clone(), a.theta_rad), (0..0, b.theta_rad));
+        }
+        prop_assert_eq!(without.lookup(0, config.camera.eye()).count(), 0);
+        for lay_out in [Atlas::packed, Atlas::layered] {
+            prop_assert!(lay_out(&without, 8192).unwrap().places.is_empty());
+        }
+    }
 }
 
 proptest! {

@@ -10,7 +10,8 @@ use clap::Args;
 #[command(after_help = "\
 Each frame plans, draws the maps, and draws the picture; techniques take turns, so that ratios between them hold on a
 noisy machine. `depth` and `shade` are the GPU's own time where it tells (`umbrage devices`), else wall-clock time;
-`frame` is all from planning to the GPU's being done, on the wall clock.
+`frame` is all from planning to the GPU's being done, on the wall clock. `cost` is what the shadows add: plan + depth +
+filter + shade, less the shade of `none`, the same frame without shadows, which takes turns too.
 
 Examples:
   umbrage bench town --shadows uniform --shadows lispsm --shadows lispsm+z4

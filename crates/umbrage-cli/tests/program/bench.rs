@@ -25,8 +25,9 @@ fn every_stage_has_its_times() {
             assert_eq!(result["map_draws"].as_array().unwrap().len(), maps);
             assert!(result["map_draws"][0]["triangles"].as_u64().unwrap() > 0);
             assert!(result["bytes"].as_u64().unwrap() >= 4 * result["texels"].as_u64().unwrap());
-            assert_eq!(keys(&result["ms"]), ["depth", "filter", "frame", "plan", "shade"]);
-            for stage in ["plan", "depth", "shade", "frame"] {
+            let stages = ["depth", "filter", "frame", "plan", "shade", "shade_none"];
+            assert_eq!(keys(&result["ms"]), stages);
+            for stage in ["plan", "depth", "shade", "shade_none", "frame"] {
                 let spread = &result["ms"][stage];
                 let [min, median, max] =
                     ["min", "median", "max"].map(|f| spread[f].as_f64().unwrap());
@@ -36,6 +37,44 @@ fn every_stage_has_its_times() {
         }
         assert_eq!(results[1]["shadows"], "lispsm+z3:pcf3@64");
     }
+}
+
+fn median(spread: &serde_json::Value) -> f64 {
+    spread["median"].as_f64().unwrap()
+}
+
+/// The cost is a difference to frames without shadows, which are drawn whether they are asked for
+/// or not, by the same backend as the technique.
+#[needs(gpu)]
+#[test]
+fn costs_are_differences_to_frames_without_shadows() {
+    let desk = Desk::new();
+    let command = "bench pole --size 48x27 --shadows lispsm@64 --shadows log@64";
+    let table = desk.succeed(&words(command));
+    let rows: Vec<&str> = table.lines().map(|l| l.split_whitespace().next().unwrap()).collect();
+    assert_eq!(rows, ["median", "lispsm@64", "log@64", "none", "log:none"], "{table}");
+    let json = desk.json(&[&words(command)[..], &["--json"]].concat());
+    assert_eq!(json["results"].as_array().unwrap().len(), 2);
+    let backends = [0, 1].map(|i| json["results"][i]["backend"].as_str().unwrap().to_owned());
+    assert_eq!(backends, ["gpu", "reference"]);
+    for result in json["results"].as_array().unwrap() {
+        let ms = &result["ms"];
+        // The bounds of a sum lie within the sums of its terms' bounds.
+        let sum = |least: &str, most: &str| {
+            let of = |stage: &str| ms[stage][least].as_f64().unwrap();
+            of("plan") + of("depth") + of("shade") - ms["shade_none"][most].as_f64().unwrap()
+        };
+        let cost = median(&result["cost"]);
+        let [least, most] = [sum("min", "max"), sum("max", "min")];
+        assert!((least..=most).contains(&cost), "{result}");
+    }
+    let command = "bench pole --size 48x27 --json --shadows none --shadows lispsm@64";
+    let json = desk.json(&words(command));
+    let none = &json["results"][0];
+    assert_eq!(json["results"].as_array().unwrap().len(), 2);
+    assert_eq!(none["cost"], none["ms"]["plan"]);
+    assert_eq!([&none["maps"], &none["texels"], &none["bytes"]], [0, 0, 0]);
+    assert_eq!(none["ms"]["shade"], json["results"][1]["ms"]["shade_none"]);
 }
 
 #[needs(gpu)]

@@ -9,6 +9,7 @@ mod fit;
 mod goldens;
 mod help;
 mod motion;
+mod none;
 mod partitions;
 mod plan;
 mod render;

@@ -110,7 +110,7 @@ impl<'a> Frame<'a> {
         let frame = |i| {
             let (camera, light) = motion.frame(look_at, light, i)?;
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
-            let plan = |t| planning::plan(t, &camera, &light, bounds).map(|(plan, _)| plan);
+            let plan = |t| planning::plan(t, &camera, &light, bounds);
             let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
             Ok(Self { view, plans })
         };

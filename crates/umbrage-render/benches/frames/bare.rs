@@ -1,10 +1,10 @@
-//! A depth pass over the first map of a plan, written in plain wgpu without any library.
+//! Depth passes over the maps of a plan, written in plain wgpu without any library.
 
 use bytemuck::{bytes_of, cast_slice};
 use glam::{DMat4, Mat4, Vec3, Vec4};
 use std::ops::Range;
 use umbrage::Plan;
-use umbrage_render::Gpu;
+use umbrage_render::{Gpu, Timer};
 use umbrage_scene::Scene;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
@@ -22,13 +22,11 @@ const SHADER: &str = "
         return clip_from_local * vec4f(dot(x, point), dot(y, point), dot(z, point), 1.0);
     }";
 
-/// Everything that the depth pass needs.
+/// Everything that the depth passes need.
 pub(crate) struct BareDepth<'a> {
     scene: &'a Scene,
-    view: wgpu::TextureView,
     pipeline: wgpu::RenderPipeline,
-    group: wgpu::BindGroup,
-    matrix: wgpu::Buffer,
+    maps: Vec<BareMap>,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     instances: wgpu::Buffer,
@@ -36,6 +34,41 @@ pub(crate) struct BareDepth<'a> {
     meshes: Vec<(Range<u32>, i32)>,
     boxes: Vec<umbrage::Aabb>,
     by_mesh: Vec<usize>,
+}
+
+/// A map with a texture of its own.
+struct BareMap {
+    view: wgpu::TextureView,
+    group: wgpu::BindGroup,
+    matrix: wgpu::Buffer,
+}
+
+impl BareMap {
+    fn new(gpu: &Gpu, pipeline: &wgpu::RenderPipeline, resolution: [u32; 2]) -> Self {
+        let device = gpu.device();
+        let matrix = device.create_buffer_init(&BufferInitDescriptor {
+            label: None,
+            contents: bytes_of(&Mat4::IDENTITY),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: matrix.as_entire_binding() }],
+        });
+        let [width, height] = resolution;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Depth32Float,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        Self { view: texture.create_view(&Default::default()), group, matrix }
+    }
 }
 
 impl<'a> BareDepth<'a> {
@@ -56,41 +89,21 @@ impl<'a> BareDepth<'a> {
         let buffer = |contents: &[u8], usage| {
             device.create_buffer_init(&BufferInitDescriptor { label: None, contents, usage })
         };
-        let matrix = buffer(
-            bytes_of(&Mat4::IDENTITY),
-            wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        );
         let instances = device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
-            size: 48 * scene.instances.len() as u64,
+            size: 48 * (scene.instances.len() * plan.maps.len()) as u64,
             usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
         let pipeline = depth_pipeline(gpu);
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: matrix.as_entire_binding() }],
-        });
-        let [width, height] = plan.maps[0].resolution;
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Depth32Float,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-            view_formats: &[],
-        });
+        let full = plan.maps.iter().filter(|m| !m.is_empty());
+        let maps = full.map(|m| BareMap::new(gpu, &pipeline, m.resolution)).collect();
         let mut by_mesh: Vec<usize> = (0..scene.instances.len()).collect();
         by_mesh.sort_by_key(|&i| scene.instances[i].mesh);
         Self {
             scene,
-            view: texture.create_view(&Default::default()),
             pipeline,
-            group,
-            matrix,
+            maps,
             vertices: buffer(cast_slice(&positions), wgpu::BufferUsages::VERTEX),
             indices: buffer(cast_slice(&indices), wgpu::BufferUsages::INDEX),
             instances,
@@ -101,52 +114,73 @@ impl<'a> BareDepth<'a> {
     }
 
     /// Draws and submits the same triangles as the library, culled in the same way.
-    pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan) {
-        let map = &plan.maps[0];
+    pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan, timer: Option<&Timer>) {
         let ndc = DMat4::from_cols_array_2d(&[
             [2.0, 0.0, 0.0, 0.0],
             [0.0, -2.0, 0.0, 0.0],
             [0.0, 0.0, 1.0, 0.0],
             [-1.0, 1.0, 0.0, 1.0],
         ]);
-        let clip_from_local = (ndc * map.shadow_from_local).as_mat4();
-        gpu.queue().write_buffer(&self.matrix, 0, bytes_of(&clip_from_local));
         let mut rows: Vec<[Vec4; 3]> = Vec::new();
-        let mut draws: Vec<(usize, Range<u32>)> = Vec::new();
-        for &i in self.by_mesh.iter().filter(|&&i| map.may_cast(self.boxes[i])) {
-            let instance = &self.scene.instances[i];
-            let m = instance.world_from_mesh;
-            let t = m.translation - plan.origin;
-            let at = rows.len() as u32;
-            rows.push([0, 1, 2].map(|r| m.matrix3.row(r).extend(t[r]).as_vec4()));
-            match draws.last_mut() {
-                Some((mesh, range)) if *mesh == instance.mesh => range.end = at + 1,
-                _ => draws.push((instance.mesh, at..at + 1)),
+        let mut draws: Vec<Vec<(usize, Range<u32>)>> = Vec::new();
+        for (map, bare) in plan.maps.iter().filter(|m| !m.is_empty()).zip(&self.maps) {
+            let clip_from_local = (ndc * map.shadow_from_local).as_mat4();
+            gpu.queue().write_buffer(&bare.matrix, 0, bytes_of(&clip_from_local));
+            let mut of_map: Vec<(usize, Range<u32>)> = Vec::new();
+            for &i in self.by_mesh.iter().filter(|&&i| map.may_cast(self.boxes[i])) {
+                let instance = &self.scene.instances[i];
+                let m = instance.world_from_mesh;
+                let t = m.translation - plan.origin;
+                let at = rows.len() as u32;
+                rows.push([0, 1, 2].map(|r| m.matrix3.row(r).extend(t[r]).as_vec4()));
+                match of_map.last_mut() {
+                    Some((mesh, range)) if *mesh == instance.mesh => range.end = at + 1,
+                    _ => of_map.push((instance.mesh, at..at + 1)),
+                }
             }
+            draws.push(of_map);
         }
         gpu.queue().write_buffer(&self.instances, 0, cast_slice(&rows));
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Store,
+        for (i, (bare, draws)) in self.maps.iter().zip(draws).enumerate() {
+            // The time of all passes is that of one picture.
+            let timestamp_writes = timer.map(Timer::shade_pass).map(|all| {
+                let begins = all.beginning_of_pass_write_index.filter(|_| i == 0);
+                let ends = all.end_of_pass_write_index.filter(|_| i + 1 == self.maps.len());
+                wgpu::RenderPassTimestampWrites {
+                    beginning_of_pass_write_index: begins,
+                    end_of_pass_write_index: ends,
+                    ..all
+                }
+            });
+            let is_timed = |t: &wgpu::RenderPassTimestampWrites<'_>| {
+                t.beginning_of_pass_write_index.or(t.end_of_pass_write_index).is_some()
+            };
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: &bare.view,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(1.0),
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
                 }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.group, &[]);
-        pass.set_vertex_buffer(0, self.vertices.slice(..));
-        pass.set_vertex_buffer(1, self.instances.slice(..));
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        for (mesh, instances) in draws {
-            let (indices, first) = self.meshes[mesh].clone();
-            pass.draw_indexed(indices, first, instances);
+                timestamp_writes: timestamp_writes.filter(is_timed),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &bare.group, &[]);
+            pass.set_vertex_buffer(0, self.vertices.slice(..));
+            pass.set_vertex_buffer(1, self.instances.slice(..));
+            pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+            for (mesh, instances) in draws {
+                let (indices, first) = self.meshes[mesh].clone();
+                pass.draw_indexed(indices, first, instances);
+            }
         }
-        drop(pass);
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
         gpu.queue().submit([encoder.finish()]);
     }
 }

@@ -1,59 +1,155 @@
-//! Measures the ratios that the project's goals for speed are stated in, between frames that take
-//! turns within one run.
+//! What shadows cost: for each scene and each technique the times of planning, drawing the maps and
+//! looking them up, beside the same in plain wgpu and beside the same frame without shadows. All
+//! frames take turns within one run.
 //!
 //! ```sh
 //! cargo bench -p umbrage-render
+//! cargo bench -p umbrage-render -- --help
 //! ```
 //!
-//! Alpha masks are ignored, so that the depth pass without a library draws the same triangles.
-//! Times are medians of wall-clock times, with a wait for the GPU after each frame. Further scenes
-//! come from the folder `$UMBRAGE_SCENES`, as for the tests; scenes that are missing are named and
-//! left out.
+//! The binary also runs by itself: `frames --bench --folder SCENES`.
+//!
+//! Alpha masks are ignored, so that the depth passes in plain wgpu draw the same triangles.
 
 #![allow(missing_docs, reason = "a benchmark")]
 
 mod bare;
+mod cases;
+mod lookup;
+mod table;
 
 use bare::BareDepth;
-use std::path::Path;
+use cases::Case;
+use clap::Parser;
+use lookup::bare_renderer;
+use std::path::PathBuf;
 use std::time::Instant;
+use table::{Jobs, Table};
 use umbrage::visibility::Filter;
-use umbrage::{Bounds, Camera, Light, Plan, Planner, Technique};
-use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading};
-use umbrage_scene::Scene;
+use umbrage::{Bounds, Camera, Plan, Planner, Size, Technique};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Number of frames of each job. The jobs take turns, and the first two frames of each do not
-/// count.
-const FRAMES: usize = 22;
+/// Number of first frames of each job that do not count.
+const WARM_UP: usize = 1;
 
-/// A scene with its default view and light.
+/// The techniques of the table, unless others are asked for.
+const TECHNIQUES: [&str; 11] = [
+    "uniform",
+    "uniform:pcf2",
+    "uniform:pcf3",
+    "uniform:pcf5",
+    "uniform:pcss",
+    "uniform+z4",
+    "adaptive",
+    "adaptive:pcf2",
+    "adaptive:pcf3",
+    "adaptive+z2(fitted):pcf2",
+    "adaptive+z4:pcf3",
+];
+
+/// Measures what shadows cost, as ratios between frames that take turns.
+#[derive(Parser)]
+struct Args {
+    /// Built-in scenes, as `town:40`, or files in the folder; or views by parts of their names.
+    /// Several with commas between them.
+    #[arg(long, value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// The views of this JSON file, as for `umbrage sweep`, in place of scenes' default views.
+    #[arg(long, value_name = "FILE")]
+    views: Option<PathBuf>,
+    /// The folder of third-party scenes.
+    #[arg(long, default_value = third_party_scenes!())]
+    folder: PathBuf,
+    /// A technique; the option can be repeated.
+    #[arg(long, value_name = "TECHNIQUE")]
+    shadows: Vec<String>,
+    /// The budget of techniques that tell no number of texels is this number squared.
+    #[arg(long, default_value_t = 2048, value_parser = clap::value_parser!(u64).range(1..=65536))]
+    texels: u64,
+    /// Width and height of the picture, pixels.
+    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = size)]
+    size: [u32; 2],
+    /// Number of frames that count, of each technique.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// Cargo tells benches so. Without it this program is one that only starts.
+    #[arg(long)]
+    bench: bool,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    sides.ok_or_else(|| "must be written as in 960x540".to_owned())
+}
+
+impl Args {
+    fn techniques(&self) -> Result<Vec<(String, Technique)>, Failure> {
+        let asked = self.shadows.iter().map(String::as_str);
+        let ours = TECHNIQUES.iter().copied().filter(|_| self.shadows.is_empty());
+        asked
+            .chain(ours)
+            .map(|text| {
+                let mut technique: Technique = text.parse()?;
+                if !text.contains('@') {
+                    technique.size = Size::Budget(self.texels.pow(2));
+                }
+                Ok((text.to_owned(), technique))
+            })
+            .collect()
+    }
+}
+
+/// A scene on the GPU, with its view, its light and the boxes of its receivers.
 struct Set<'a> {
     gpu: &'a Gpu,
-    scene: &'a Scene,
+    case: &'a Case,
     buffers: SceneBuffers<'a>,
     camera: Camera,
-    light: Light,
     boxes: Vec<umbrage::Aabb>,
+    target: FrameTarget,
+    /// `None` if the GPU has no timestamps. Times are then taken from the wall clock.
+    timer: Option<Timer>,
+}
+
+/// The times of one frame, milliseconds. Those of stages that a job does not have are 0.
+#[derive(Clone, Copy, Debug, Default)]
+struct Times {
+    plan: f64,
+    depth: f64,
+    filter: f64,
+    shade: f64,
 }
 
 impl<'a> Set<'a> {
-    fn new(gpu: &'a Gpu, scene: &'a Scene, image: [u32; 2]) -> Result<Self, Failure> {
-        let v = scene.default_view();
-        let camera = Camera::look_at(v.look_at(image))?;
-        let boxes = Tracer::new(scene)?.boxes(256);
-        let light = scene.default_light().light;
-        Ok(Self { gpu, scene, buffers: SceneBuffers::new(gpu, scene, true)?, camera, light, boxes })
+    fn new(gpu: &'a Gpu, case: &'a Case, image: [u32; 2]) -> Result<Self, Failure> {
+        Ok(Self {
+            gpu,
+            case,
+            buffers: SceneBuffers::new(gpu, &case.scene, true)?,
+            camera: Camera::look_at(case.look_at(image))?,
+            boxes: Tracer::new(&case.scene)?.boxes(256),
+            target: FrameTarget::new(gpu, image)?,
+            timer: Timer::new(gpu),
+        })
     }
 
-    fn plan(&self, technique: &Technique) -> Result<Plan, Failure> {
-        let bounds =
-            Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
-        Ok(Planner::new().plan(&self.camera, &[self.light], &bounds, technique)?.clone())
+    fn plan(&self, planner: &mut Planner, technique: &Technique) -> Result<Plan, Failure> {
+        Ok(self.planned(planner, technique)?.clone())
+    }
+
+    fn planned<'p>(
+        &self,
+        planner: &'p mut Planner,
+        technique: &Technique,
+    ) -> Result<&'p Plan, Failure> {
+        let bounds = Bounds::of_scene(self.case.scene.bounds());
+        let bounds = Bounds { receiver_parts: &self.boxes, ..bounds };
+        Ok(planner.plan(&self.camera, &[self.case.light], &bounds, technique)?)
     }
 
     fn renderer(&self, filter: Filter) -> Result<Renderer<'_, 'a>, Failure> {
@@ -61,167 +157,174 @@ impl<'a> Set<'a> {
         Ok(Renderer::new(self.gpu, &self.buffers, &options)?)
     }
 
-    /// Draws the maps and the picture.
-    fn frame(
-        &self,
-        renderer: &mut Renderer<'_, '_>,
-        plan: &Plan,
-        target: &FrameTarget,
-    ) -> Result<(), Failure> {
-        renderer.draw_maps(plan, Casters::Moved, None)?;
-        let shading = Shading { camera: &self.camera, light: &self.light, light_index: 0 };
-        renderer.frame(&shading, target, None)?;
-        Ok(self.gpu.wait()?)
-    }
-}
-
-/// Median times of several jobs that take turns, milliseconds.
-fn race(jobs: &mut [&mut dyn FnMut() -> Result<(), Failure>]) -> Result<Vec<f64>, Failure> {
-    let mut times = vec![Vec::new(); jobs.len()];
-    for frame in 0..FRAMES {
-        for turn in 0..jobs.len() {
-            let i = (turn + frame) % jobs.len();
-            let start = Instant::now();
-            jobs[i]()?;
-            if frame >= 2 {
-                times[i].push(start.elapsed().as_secs_f64() * 1e3);
+    /// The times that the GPU took for depth passes, filter passes and the picture since `start`.
+    /// Without timestamps, all of it counts as the time of the picture.
+    fn read(&self, start: Instant) -> Result<[f64; 3], Failure> {
+        match &self.timer {
+            Some(timer) => Ok(timer.read(self.gpu)?),
+            None => {
+                self.gpu.wait()?;
+                Ok([0.0, 0.0, milliseconds(start)])
             }
         }
     }
-    Ok(times
-        .into_iter()
-        .map(|mut t| {
-            t.sort_by(f64::total_cmp);
-            t[t.len() / 2]
-        })
-        .collect())
-}
 
-/// Compares techniques with each other. Returns the ratios lispsm / uniform and lispsm+z4 / lispsm.
-fn techniques(set: &Set<'_>) -> Result<[f64; 2], Failure> {
-    let plan = |text: &str| set.plan(&text.parse()?);
-    let (uniform, lispsm) = (plan("uniform:pcf3@1024")?, plan("lispsm:pcf3@1024")?);
-    let slices = plan("lispsm+z4:pcf3@1024")?;
-    let target = FrameTarget::new(set.gpu, set.camera.image())?;
-    let pcf = uniform.filter;
-    let [mut a, mut b, mut c] = [set.renderer(pcf)?, set.renderer(pcf)?, set.renderer(pcf)?];
-    let times = race(&mut [
-        &mut || set.frame(&mut a, &uniform, &target),
-        &mut || set.frame(&mut b, &lispsm, &target),
-        &mut || set.frame(&mut c, &slices, &target),
-    ])?;
-    println!(
-        "  frame: uniform {:.1} ms, lispsm {:.1} ms ({:.3} of uniform), lispsm+z4 {:.1} ms ({:.3} of lispsm)",
-        times[0],
-        times[1],
-        times[1] / times[0],
-        times[2],
-        times[2] / times[1]
-    );
-    Ok([times[1] / times[0], times[2] / times[1]])
-}
-
-/// Compares the depth pass with one written without any library, and a pass over unchanged maps
-/// with the first one. Returns both ratios.
-fn depth_pass(set: &Set<'_>) -> Result<[f64; 2], Failure> {
-    let plan = set.plan(&"lispsm:pcf3@2048".parse()?)?;
-    let mut moved = set.renderer(plan.filter)?;
-    let mut unmoved = set.renderer(plan.filter)?;
-    let mut bare = BareDepth::new(set.gpu, set.scene, &plan);
-    let start = Instant::now();
-    unmoved.draw_maps(&plan, Casters::Unmoved, None)?;
-    set.gpu.wait()?;
-    let first = start.elapsed().as_secs_f64() * 1e3;
-    let times = race(&mut [
-        &mut || {
-            moved.draw_maps(&plan, Casters::Moved, None)?;
-            Ok(set.gpu.wait()?)
-        },
-        &mut || {
-            bare.draw(set.gpu, &plan);
-            Ok(set.gpu.wait()?)
-        },
-        &mut || {
-            unmoved.draw_maps(&plan, Casters::Unmoved, None)?;
-            Ok(set.gpu.wait()?)
-        },
-    ])?;
-    println!(
-        "  depth pass, 2048²: {:.1} ms, bare wgpu {:.1} ms (ratio {:.3}); unchanged {:.3} ms, first {:.1} ms (ratio {:.4})",
-        times[0],
-        times[1],
-        times[0] / times[1],
-        times[2],
-        first,
-        times[2] / first
-    );
-    Ok([times[0] / times[1], times[2] / first])
-}
-
-/// Compares convolution shadow maps with bilinear comparisons, in the configuration of Annen et al.
-/// 2007, Table 1: a map of 1024², a picture of 1024×768.
-fn filters(gpu: &Gpu, scene: &Scene) -> Result<(), Failure> {
-    let set = Set::new(gpu, scene, [1024, 768])?;
-    let target = FrameTarget::new(gpu, set.camera.image())?;
-    let names =
-        ["pcf2", "csm4", "csm8", "csm16", "csm4(blur=7)", "csm4(blur=3,half)", "csm4(blur=1px)"];
-    let mut contenders = Vec::new();
-    for name in names {
-        let plan = set.plan(&format!("uniform:{name}@1024x1024").parse()?)?;
-        contenders.push((set.renderer(plan.filter)?, plan));
+    /// Plans, draws the maps, and draws the picture.
+    fn frame(
+        &self,
+        planner: &mut Planner,
+        technique: &Technique,
+        renderer: &mut Renderer<'_, '_>,
+    ) -> Result<Times, Failure> {
+        let start = Instant::now();
+        let plan = self.planned(planner, technique)?;
+        let planned = milliseconds(start);
+        let start = Instant::now();
+        let drawn = renderer.draw_maps(plan, Casters::Moved, self.timer.as_ref())?;
+        let mut times = Times { plan: planned, ..Times::default() };
+        if !drawn.is_empty() {
+            let [depth, filter, wall] = self.read(start)?;
+            let is_prefiltered = technique.filter.prefilter().is_some();
+            times.depth = if self.timer.is_some() { depth } else { wall };
+            times.filter = if is_prefiltered { filter } else { 0.0 };
+        }
+        times.shade = self.picture(renderer)?;
+        Ok(times)
     }
-    let mut jobs: Vec<_> =
-        contenders.iter_mut().map(|(r, plan)| || set.frame(r, plan, &target)).collect();
-    let mut jobs: Vec<&mut dyn FnMut() -> Result<(), Failure>> =
-        jobs.iter_mut().map(|job| job as _).collect();
-    let times = race(&mut jobs)?;
-    let triangles: usize =
-        scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len()).sum();
-    println!("{}, {triangles} triangles, 1024² texels, 1024×768:", scene.name);
-    for (name, time) in names.iter().zip(&times) {
-        println!("  {name}: {time:.1} ms, {:.3} of pcf2", time / times[0]);
+
+    /// Draws the picture, and returns the time that it takes.
+    fn picture(&self, renderer: &mut Renderer<'_, '_>) -> Result<f64, Failure> {
+        let shading = Shading { camera: &self.camera, light: &self.case.light, light_index: 0 };
+        let start = Instant::now();
+        renderer.frame(&shading, &self.target, self.timer.as_ref())?;
+        Ok(self.read(start)?[2])
     }
-    Ok(())
+
+    /// Draws the maps without a library, and returns the time that it takes.
+    fn bare_depth(&self, bare: &mut BareDepth<'_>, plan: &Plan) -> Result<f64, Failure> {
+        let start = Instant::now();
+        bare.draw(self.gpu, plan, self.timer.as_ref());
+        Ok(self.read(start)?[2])
+    }
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+type Job<'a> = Box<dyn FnMut() -> Result<Times, Failure> + 'a>;
+
+/// The times of all frames of several jobs that take turns, by frame and job.
+fn race(mut jobs: Vec<Job<'_>>, frames: usize) -> Result<Vec<Vec<Times>>, Failure> {
+    let mut all = Vec::with_capacity(frames);
+    for frame in 0..frames + WARM_UP {
+        let mut times = vec![Times::default(); jobs.len()];
+        for turn in 0..jobs.len() {
+            let i = (turn + frame) % jobs.len();
+            times[i] = jobs[i]()?;
+        }
+        if frame >= WARM_UP {
+            all.push(times);
+        }
+    }
+    Ok(all)
+}
+
+/// Appends a job, and returns its index.
+fn add<'a>(jobs: &mut Vec<Job<'a>>, job: Job<'a>) -> usize {
+    jobs.push(job);
+    jobs.len() - 1
+}
+
+/// Measures all techniques in one view.
+fn measure(
+    set: &Set<'_>,
+    techniques: &[(String, Technique)],
+    args: &Args,
+) -> Result<Table, Failure> {
+    let mut planner = Planner::new();
+    let mut jobs: Vec<Job<'_>> = Vec::new();
+    let none = Technique { filter: Filter::None, ..Technique::default() };
+    let frame = |technique: Technique| -> Result<Job<'_>, Failure> {
+        let (mut planner, mut renderer) = (Planner::new(), set.renderer(technique.filter)?);
+        Ok(Box::new(move || set.frame(&mut planner, &technique, &mut renderer)))
+    };
+    let without_shadows = add(&mut jobs, frame(none)?);
+    // A bare frame with each filter has one even map.
+    let mut bare: Vec<(Filter, usize)> = Vec::new();
+    let mut rows = Vec::new();
+    for (_, technique) in techniques.iter().filter(|(_, t)| t.filter.has_maps()) {
+        let plan = set.plan(&mut planner, technique)?;
+        let mut depth = BareDepth::new(set.gpu, &set.case.scene, &plan);
+        let bare_depth = add(
+            &mut jobs,
+            Box::new(move || {
+                Ok(Times { depth: set.bare_depth(&mut depth, &plan)?, ..Times::default() })
+            }),
+        );
+        if !bare.iter().any(|(filter, _)| *filter == technique.filter) {
+            let even: Technique = "uniform".parse()?;
+            let even = Technique { filter: technique.filter, size: technique.size, ..even };
+            let plan = set.plan(&mut planner, &even)?;
+            if let Some(mut renderer) = bare_renderer(set, &plan)? {
+                let mut depth = BareDepth::new(set.gpu, &set.case.scene, &plan);
+                let job = add(
+                    &mut jobs,
+                    Box::new(move || {
+                        let depth = set.bare_depth(&mut depth, &plan)?;
+                        Ok(Times { depth, shade: set.picture(&mut renderer)?, ..Times::default() })
+                    }),
+                );
+                bare.push((technique.filter, job));
+            }
+        }
+        rows.push((add(&mut jobs, frame(*technique)?), bare_depth, technique.filter));
+    }
+    let frames = race(jobs, args.frames as usize)?;
+    let bare_of = |filter| bare.iter().find(|(f, _)| *f == filter).map(|(_, job)| *job);
+    let row = |name: &str, frame, bare, bare_depth| Jobs {
+        name: name.to_owned(),
+        frame,
+        bare,
+        bare_depth,
+    };
+    let mut table = vec![row("none", without_shadows, None, None)];
+    table.extend(bare.iter().map(|(filter, job)| row(&format!("bare {filter}"), *job, None, None)));
+    let shadowed = techniques.iter().filter(|(_, t)| t.filter.has_maps());
+    table.extend(shadowed.zip(rows).map(|((name, _), (frame, bare_depth, filter))| {
+        row(name, frame, bare_of(filter), Some(bare_depth))
+    }));
+    Ok(Table::new(&frames, without_shadows, table))
 }
 
 fn main() -> Result<(), Failure> {
+    let args = Args::parse();
     // `cargo test --benches` also runs this program, to check that it starts.
-    if !std::env::args().any(|a| a == "--bench") {
+    if !args.bench {
         return Ok(());
     }
+    let techniques = args.techniques()?;
+    let cases = cases::list(&args)?;
     let gpu = Gpu::open()?;
-    println!("{}", gpu.info().name);
-    let folder = Path::new(third_party_scenes!());
-    let mut scenes = Vec::new();
-    for name in ["town", "airfield", "statues"] {
-        scenes.push(umbrage_scene::builtin(name, None)?);
-    }
-    for name in [
-        "vehicles/kenney_racing_level.glb",
-        "city/kenney_city_40x40.glb",
-        "terrain/jacksboro_dem_terrain.glb",
-        "trees/forest_eztree.glb",
-    ] {
-        match umbrage_scene::load(&folder.join(name)) {
-            Ok(scene) => scenes.push(scene),
-            Err(e) => println!("left out: {e}"),
-        }
-    }
-    filters(&gpu, &umbrage_scene::builtin("grove", Some(30))?)?;
-    if let Some(forest) = scenes.iter().find(|s| s.name.starts_with("forest")) {
-        filters(&gpu, forest)?;
-    }
-    let mut sums = [0.0; 4];
-    for scene in &scenes {
-        println!("{}", scene.name);
-        let set = Set::new(&gpu, scene, [960, 540])?;
-        let ratios = [techniques(&set)?, depth_pass(&set)?].concat();
-        sums.iter_mut().zip(ratios).for_each(|(sum, ratio)| *sum += f64::ln(ratio));
-    }
-    let [lispsm, slices, bare, unchanged] = sums.map(|s| (s / scenes.len() as f64).exp());
+    let image = args.size;
+    let has_timestamps = Timer::new(&gpu).is_some();
     println!(
-        "geometric means: lispsm/uniform {lispsm:.3}, lispsm+z4/lispsm {slices:.3}, library/bare depth pass {bare:.3}, \
-         unchanged/first {unchanged:.4}"
+        "{}, {}x{} pixels, medians of {} frames, ms {}",
+        gpu.info().name,
+        image[0],
+        image[1],
+        args.frames,
+        if has_timestamps { "by timestamps" } else { "on the wall clock" }
     );
+    let mut tables = Vec::new();
+    for case in cases {
+        let case = case.load()?;
+        let table = measure(&Set::new(&gpu, &case, image)?, &techniques, &args)?;
+        println!("\n{}, {} triangles\n{}", case.name, case.triangles(), table.text());
+        tables.push(table);
+    }
+    if tables.len() > 1 {
+        println!("\ngeometric means of the ratios\n{}", table::means(&tables));
+    }
     Ok(())
 }

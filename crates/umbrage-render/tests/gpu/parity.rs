@@ -285,6 +285,39 @@ fn every_fallback_draws_the_same_picture() {
     }
 }
 
+/// Without shadows nothing is drawn into maps, and every counted sample is lit, on every device and
+/// by the reference.
+#[needs(gpu)]
+#[test]
+fn no_shadows() {
+    let scene = scene("lantern");
+    let set = Set::new(&scene, IMAGE);
+    let light = set.light();
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    let technique = technique("none", Filter::None);
+    let plan = set.plan(&[light], &technique);
+    let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+    let all = GPU.support();
+    let base = ShadowOptions { filter: Filter::None, ..ShadowOptions::default() };
+    for (options, support) in [
+        (base, all),
+        (base, Support { storage_buffers: false, ..all }),
+        (base, Support { depth_fetch: false, ..all }),
+        (ShadowOptions { layout: Layout::Layers, ..base }, all),
+        (ShadowOptions { comparison: Comparison::Hardware, ..base }, all),
+    ] {
+        let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
+        let mut renderer = Renderer::with_support(&GPU, &buffers, &options, support).unwrap();
+        assert_eq!(renderer.draw_maps(&plan, Casters::Moved, None).unwrap(), []);
+        assert_eq!(renderer.shadows().lookup_bytes(), 0);
+        let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
+        let difference = compare(&set, &plan, (0, &light), &samples, &reference);
+        check("lantern", &technique, &difference);
+        assert!(samples.iter().all(|s| !s.is_facing || s.visibility == 1.0));
+        assert!(samples.iter().all(|s| s.map.is_none() && s.error.is_nan()));
+    }
+}
+
 #[needs(gpu)]
 #[test]
 fn every_prefilter_in_three_scenes() {

@@ -76,7 +76,8 @@ fn variants() -> impl Iterator<Item = (ShadowOptions, bool)> {
         .into_iter()
         .flat_map(move |pattern| widths.map(|width| Filter::Spread { n: 5, width, pattern }));
     let soft = [1, 8].map(|n| Filter::Pcss { n, light: LightSize::Metres(0.5) });
-    let filters = [Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
+    let filters =
+        [Filter::None, Filter::Hard].into_iter().chain((1..=15).map(|n| Filter::Pcf { n }));
     let filters = filters.chain(prefiltered).chain(spread).chain(soft);
     let with = |filter| {
         let comparisons = [Comparison::PerTexel, Comparison::Hardware];

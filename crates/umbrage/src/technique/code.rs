@@ -93,7 +93,7 @@ fn size_code(size: Size) -> String {
 
 fn filter_code(filter: &Filter) -> String {
     match filter {
-        Filter::Hard | Filter::Pcf { .. } => format!("Filter::{filter:?}"),
+        Filter::None | Filter::Hard | Filter::Pcf { .. } => format!("Filter::{filter:?}"),
         Filter::Spread { n, width, pattern } => format!(
             "Filter::Spread {{ n: {n}, width: Width::{width:?}, pattern: Pattern::{pattern:?} }}"
         ),

@@ -40,7 +40,18 @@ const EXPONENT: WordOption = WordOption {
     meaning: "How steep the exponentials are.",
 };
 
+/// The filter's word that is also a technique by itself.
+pub(super) const NONE: &str = "none";
+
 pub(super) const WORDS: &[Word] = &[
+    Word {
+        name: NONE,
+        value: "",
+        example: NONE,
+        options: &[],
+        meaning: "No shadows and no maps: the frame to which a technique's cost is the difference. \
+                  `none` is a whole technique.",
+    },
     Word {
         name: "hard",
         value: "",
@@ -222,6 +233,7 @@ pub(super) fn read(text: &str) -> Result<Filter, ParseError> {
             prefiltered(&written, Statistic::Evsm(Evsm { components, exponent, leak }))?
         }
         "csm" => prefiltered(&written, Statistic::Csm(read_csm(&written)?))?,
+        NONE => Filter::None,
         _ => Filter::Hard,
     };
     filter.check().map_err(|e| ParseError::new(format!("`{text}`: {e}")))?;
@@ -324,6 +336,7 @@ fn read_light(text: &str) -> Result<LightSize, ParseError> {
 impl fmt::Display for Filter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::None => f.write_str(NONE),
             Self::Hard => f.write_str("hard"),
             Self::Pcf { n } => write!(f, "pcf{n}"),
             Self::Spread { n, width, pattern } => {

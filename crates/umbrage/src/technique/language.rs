@@ -1,10 +1,11 @@
-//! The language in which techniques are written: `WARP[+zK][+face][:FILTER][@TEXELS]`.
+//! The language in which techniques are written: `WARP[+zK][+face][:FILTER][@TEXELS]`, or `none`.
 //!
 //! [`Technique`] parses and prints this language. Each word stands in one of four tables, with its
 //! options and a sentence about each. The parser, the printer's tests, [`help`] and the
 //! explanations in reports all use these tables.
 
 use super::{Size, Technique, filters, layouts};
+use crate::visibility::Filter;
 use std::fmt::{self, Display, LowerExp, Write};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -101,7 +102,7 @@ pub fn nearest<'a>(text: &str, names: impl IntoIterator<Item = &'a str>) -> &'a 
 pub fn help() -> String {
     let mut page = String::from(
         "A technique is written WARP[+zK][+face][:FILTER][@TEXELS], as in\n\
-         adaptive+z4:pcf3@2048.\n",
+         adaptive+z4:pcf3@2048, or is none.\n",
     );
     let tables = [
         ("WARP: how texels are spread", "", WARPS),
@@ -166,7 +167,9 @@ pub fn explain(text: &str) -> Vec<(String, &'static str)> {
             }
         }
     };
-    add(Kind::Warp, parts.warp);
+    if let Some(warp) = parts.warp {
+        add(Kind::Warp, warp);
+    }
     parts.partitions.iter().for_each(|part| add(Kind::Partition, part));
     if let Some(filter) = parts.filter {
         add(Kind::Filter, filter);
@@ -179,7 +182,8 @@ pub fn explain(text: &str) -> Vec<(String, &'static str)> {
 
 /// A technique's text, split into its parts.
 struct Parts<'a> {
-    warp: &'a str,
+    /// `None` if the text is the filter `none` alone.
+    warp: Option<&'a str>,
     partitions: Vec<&'a str>,
     filter: Option<&'a str>,
     size: Option<&'a str>,
@@ -187,6 +191,9 @@ struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     fn of(text: &'a str) -> Self {
+        if text == filters::NONE {
+            return Self { warp: None, partitions: Vec::new(), filter: Some(text), size: None };
+        }
         let (head, size) = split_once(text, '@');
         let (layout, filter) = split_once(head, ':');
         let mut depth = 0;
@@ -195,7 +202,8 @@ impl<'a> Parts<'a> {
             depth += i32::from(c == '(') - i32::from(c == ')');
             c == '+' && depth <= 0
         });
-        Self { warp: parts.next().unwrap_or_default(), partitions: parts.collect(), filter, size }
+        let warp = Some(parts.next().unwrap_or_default());
+        Self { warp, partitions: parts.collect(), filter, size }
     }
 }
 
@@ -209,8 +217,12 @@ impl FromStr for Technique {
                 "`@{size}`: `@TEXELS` comes last, as in `uniform:pcf3@1024`"
             )));
         }
-        let (warp, cover) = layouts::read_warp(warp)?;
+        if warp == Some(filters::NONE) {
+            let problem = format!("`{text}`: `none` has no maps, so nothing follows it");
+            return Err(ParseError::new(problem).suggest(filters::NONE));
+        }
         let default = Self::default();
+        let (warp, cover) = warp.map_or(Ok((default.warp, default.cover)), layouts::read_warp)?;
         Ok(Self {
             warp,
             cover,
@@ -225,6 +237,9 @@ impl FromStr for Technique {
 impl Display for Technique {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let default = Self::default();
+        if *self == (Self { filter: Filter::None, ..default }) {
+            return f.write_str(filters::NONE);
+        }
         layouts::write_warp(f, self.warp, self.cover)?;
         layouts::write_partition(f, &self.partition)?;
         if self.filter != default.filter {

@@ -65,6 +65,9 @@ const ROUNDING: f64 = 1e-6;
 /// How the texels around a receiver are looked up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Filter {
+    /// No shadows: everything is lit. Plans for this filter have no maps. What shadows cost is the
+    /// difference to a frame with this filter.
+    None,
     /// One comparison with the nearest texel.
     #[default]
     Hard,
@@ -167,8 +170,17 @@ impl Filter {
     pub fn prefilter(&self) -> Option<&Prefilter> {
         match self {
             Self::Prefiltered(prefilter) => Some(prefilter),
-            Self::Hard | Self::Pcf { .. } | Self::Spread { .. } | Self::Pcss { .. } => None,
+            Self::None
+            | Self::Hard
+            | Self::Pcf { .. }
+            | Self::Spread { .. }
+            | Self::Pcss { .. } => None,
         }
+    }
+
+    /// Whether lookup reads maps, without which a plan has none.
+    pub fn has_maps(self) -> bool {
+        self != Self::None
     }
 
     /// Percentage-closer filtering over `n` × `n` texels.
@@ -185,7 +197,7 @@ impl Filter {
     /// How many texels beyond the map's border lookups of receivers within the map can read.
     pub fn reach_texels(self) -> u32 {
         match self {
-            Self::Hard => 0,
+            Self::None | Self::Hard => 0,
             Self::Pcf { n } => n.clamp(1, Self::MAX_PCF) / 2 + 1,
             Self::Spread { .. } | Self::Pcss { .. } => SPREAD_REACH,
             Self::Prefiltered(prefilter) => prefilter.reach_texels(),
@@ -239,7 +251,7 @@ impl Filter {
     /// Names the parameter that is out of its range.
     pub fn check(&self) -> Result<(), Error> {
         match self {
-            Self::Hard => Ok(()),
+            Self::None | Self::Hard => Ok(()),
             Self::Pcf { n } => Self::pcf(*n).map(drop),
             Self::Spread { n, width, pattern } => {
                 if *pattern == Pattern::Poisson {
@@ -306,6 +318,7 @@ pub fn visibility(
         (lit as f64 / f64::from(n * n)) as f32
     };
     match filter {
+        Filter::None => 1.0,
         Filter::Hard => {
             let last = |n: u32| f64::from(n - 1);
             let i = texel.x.floor().clamp(0.0, last(map.resolution[0]));
