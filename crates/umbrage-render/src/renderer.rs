@@ -203,30 +203,32 @@ impl<'g, 's> Renderer<'g, 's> {
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = plan.origin;
         instances.begin(scene, plan.origin);
-        let lists: Vec<(usize, DrawList)> = prepared
+        let lists: Vec<DrawList> = prepared
             .stale()
-            .map(|map| (map, instances.add(scene, |aabb| plan.maps[map].may_cast(aabb))))
+            .map(|redraw| instances.add(scene, |aabb| redraw.may_cast(aabb)))
             .collect();
-        let mut drawn = Vec::with_capacity(lists.len());
+        let mut drawn: Vec<(usize, Drawn)> = Vec::with_capacity(lists.len());
         if lists.is_empty() {
             return Ok(drawn);
         }
         instances.upload(gpu)?;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
+        let mut lists = lists.into_iter();
         prepared.encode(&mut encoder, &timestamps, |map| {
-            let list = lists.iter().find(|(index, _)| *index == map.index);
-            let draws = list.map_or(&[][..], |(_, list)| instances.draws(list.clone()));
-            let mut into_map = Drawn::default();
-            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, &mut into_map);
-            for draw in draws {
+            let index = map.redraw.index;
+            if drawn.last().is_none_or(|&(last, _)| last != index) {
+                drawn.push((index, Drawn::default()));
+            }
+            let Some((list, (_, into_map))) = lists.next().zip(drawn.last_mut()) else { return };
+            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, into_map);
+            for draw in instances.draws(list) {
                 let is_masked = scene.is_masked(draw.mesh);
                 let casters = if is_masked { &*masked } else { &*opaque };
                 drawer.choose(is_masked, casters.pipeline());
                 drawer.bind(1, draw.mesh, |material| masks[material].as_ref());
                 drawer.draw(draw);
             }
-            drawn.push((map.index, into_map));
         });
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);

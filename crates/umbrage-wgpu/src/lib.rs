@@ -52,6 +52,7 @@ mod data;
 mod error;
 mod passes;
 mod prefilter;
+mod redraw;
 mod shadows;
 mod slots;
 mod support;
@@ -60,6 +61,7 @@ mod wgsl;
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
+pub use redraw::Redraw;
 pub use shadows::{Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, ShadowOptions, Shadows};
 pub use support::Support;
 
