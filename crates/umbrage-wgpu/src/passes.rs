@@ -82,7 +82,7 @@ impl Prepared<'_> {
             let redraw = move |place| {
                 let map = &self.plan.maps[index];
                 let parts = record.stale.parts();
-                parts.map(move |texels| Redraw::new(map, index, place, &filter, texels))
+                parts.map(move |texels| Redraw::new(map, index, record, place, &filter, texels))
             };
             place.into_iter().flat_map(redraw)
         })
@@ -135,7 +135,14 @@ impl Prepared<'_> {
                     pass.set_bind_group(0, &casters.bind_group, &[offset]);
                     draw(&mut MapPass {
                         pass: &mut pass,
-                        redraw: Redraw::new(&plan.maps[index], index, place, &filter, texels),
+                        redraw: Redraw::new(
+                            &plan.maps[index],
+                            index,
+                            record,
+                            place,
+                            &filter,
+                            texels,
+                        ),
                         clip_from_render: record.clip_from_render.as_mat4(),
                         render_origin,
                     });

@@ -1,5 +1,7 @@
 //! What of a map is drawn again: all of it, or the parts in which casters have moved.
 
+use crate::culling::{FourPlanes, LocalBox};
+use crate::shadows::Record;
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Place, Plane, ShadowMap};
 
@@ -21,14 +23,17 @@ pub struct Redraw<'a> {
     pub index: usize,
     /// The texels of the depth texture that are drawn. They include the map's gutter.
     pub rectangle: Place,
-    /// If only a part is drawn, the half-spaces, in local space, around the beams through it.
-    beams: Option<[Plane; 4]>,
+    /// If only a part is drawn, the half-spaces around the beams through it.
+    beams: Option<FourPlanes>,
+    /// The half-spaces around all that casts into the map.
+    caster_planes: &'a [FourPlanes],
 }
 
 impl<'a> Redraw<'a> {
     pub(crate) fn new(
         shadow_map: &'a ShadowMap,
         index: usize,
+        record: &'a Record,
         place: Place,
         filter: &Filter,
         texels: Texels,
@@ -44,6 +49,7 @@ impl<'a> Redraw<'a> {
                 ..place
             },
             beams: (!is_whole).then(|| beams(shadow_map, filter, texels)),
+            caster_planes: &record.four_planes,
         }
     }
 
@@ -51,31 +57,30 @@ impl<'a> Redraw<'a> {
     /// conservative: it is never `false` for a box that can cast, but may be `true` for one that
     /// cannot.
     pub fn may_cast(&self, aabb: Aabb) -> bool {
-        let origin = self.shadow_map.origin;
-        let local = Aabb { min: aabb.min - origin, max: aabb.max - origin };
-        let touches = |beams: &[Plane; 4]| beams.iter().all(|p| p.may_touch(local));
-        self.beams.as_ref().is_none_or(touches) && self.shadow_map.may_cast(aabb)
+        let local = LocalBox::new(aabb, self.shadow_map.origin);
+        !local.is_empty()
+            && self.beams.iter().chain(self.caster_planes).all(|planes| planes.may_touch(&local))
     }
 }
 
-/// The half-spaces around the beams through some texels of a map, in local space. Their normals are
-/// not of unit length.
-fn beams(map: &ShadowMap, filter: &Filter, texels: Texels) -> [Plane; 4] {
+/// The half-spaces around the beams through some texels of a map.
+fn beams(map: &ShadowMap, filter: &Filter, texels: Texels) -> FourPlanes {
     let m = map.shadow_from_local;
     let gutter = f64::from(filter.reach_texels());
     // Where w is positive, s is at least s₀ if the row of s less s₀ times that of w is.
     let side = |axis: usize, texel: f64, sign: f64| {
         let at = (texel - gutter) / f64::from(map.resolution[axis]);
         let plane = (m.row(axis) - m.row(3) * at) * sign;
+        let plane = plane / plane.truncate().length();
         Plane { normal: plane.truncate(), offset: plane.w }
     };
     let [first, end] = [texels.first, texels.end].map(|t| t.map(f64::from));
-    [
+    FourPlanes::new(&[
         side(0, first[0] - ROUNDING_TEXELS, 1.0),
         side(0, end[0] + ROUNDING_TEXELS, -1.0),
         side(1, first[1] - ROUNDING_TEXELS, 1.0),
         side(1, end[1] + ROUNDING_TEXELS, -1.0),
-    ]
+    ])
 }
 
 /// A rectangle among the texels that are drawn for a map. Texel 0 is the first of the gutter.

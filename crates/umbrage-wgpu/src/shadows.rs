@@ -1,5 +1,6 @@
 mod resources;
 
+use crate::culling::FourPlanes;
 use crate::data::{Lookup, Placed, clip_from_render};
 use crate::passes::{Clear, Prepared};
 use crate::prefilter::Prefiltering;
@@ -137,6 +138,8 @@ pub(crate) struct Record {
     origin: DVec3,
     slab: Slab,
     caster_planes: Vec<Plane>,
+    /// The same, to cull by.
+    pub(crate) four_planes: Vec<FourPlanes>,
 }
 
 impl Record {
@@ -170,6 +173,8 @@ impl Record {
         self.slab = map.slab;
         self.caster_planes.clear();
         self.caster_planes.extend_from_slice(&map.caster_planes);
+        self.four_planes.clear();
+        self.four_planes.extend(map.caster_planes.chunks(4).map(FourPlanes::new));
     }
 }
 

@@ -3,7 +3,9 @@
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
-use umbrage::{Aabb, Partition, Plan, Planner, Size, Technique, Warp};
+use umbrage::{
+    Aabb, Light, Partition, Plan, Planner, PointLight, ShadowMap, Size, SpotLight, Technique, Warp,
+};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
@@ -191,4 +193,56 @@ fn empty_maps_cost_nothing() {
     let plan = plan(&camera(EYE), &[sun()], &technique());
     assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
     assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Unmoved), [0; 0]);
+}
+
+/// Of many lights, those that nothing seen is in have no texels and no pass, and those that do not
+/// change are not drawn again.
+#[needs(gpu)]
+#[test]
+fn of_many_lights_only_those_are_drawn_that_are_seen_and_change() {
+    let bench = bench();
+    let lamp = |i: u32| {
+        let at =
+            |k: u32| f64::from((i * 2 + k).wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24);
+        // Half of them behind the camera, where none of what it sees is.
+        let z = if i.is_multiple_of(2) { EYE.z + 12.0 } else { -18.0 * at(1) };
+        DVec3::new(16.0 * at(0) - 8.0, 3.0, z)
+    };
+    let spot = |i: u32| {
+        Light::Spot(SpotLight {
+            position: lamp(i),
+            direction: -DVec3::Y,
+            half_angle_rad: 0.6,
+            near: 0.1,
+            range: 5.0,
+        })
+    };
+    let point = |i: u32| Light::Point(PointLight { position: lamp(i), near: 0.1, range: 5.0 });
+    let mut lights: Vec<Light> = (0..64).map(spot).chain((64..72).map(point)).collect();
+    // Sizes that follow from an error do not depend on the other lights.
+    let technique = Technique { size: Size::MaxError(8.0), ..Technique::default() };
+    for layout in [Layout::Atlas, Layout::Layers] {
+        let mut shadows = shadows(&bench, layout);
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        assert_eq!(plan.maps.len(), 64 + 8 * 6);
+        let seen: Vec<usize> = (0..plan.maps.len()).filter(|&i| !plan.maps[i].is_empty()).collect();
+        let hidden = plan
+            .lights
+            .iter()
+            .filter(|l| plan.maps[l.maps.clone()].iter().all(ShadowMap::is_empty));
+        assert!(hidden.count() >= 36 && seen.len() >= 20, "{} maps", seen.len());
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Moved), seen);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0; 0]);
+        let changing = plan.lights.iter().position(|l| l.maps.start == seen[0]).unwrap();
+        let Light::Spot(old) = lights[changing] else { panic!("spot lights come first") };
+        let direction = DVec3::new(0.05, -1.0, 0.0);
+        lights[changing] = Light::Spot(SpotLight { direction, ..old });
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        // A map that outgrows its slot can make all maps move.
+        let redrawn = drawn(&bench, &mut shadows, &plan, Casters::Unmoved);
+        assert!(redrawn == [seen[0]] || redrawn == seen, "{redrawn:?}");
+        lights[changing] = Light::Spot(SpotLight { direction: DVec3::new(0.04, -1.0, 0.0), ..old });
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [seen[0]], "{layout:?}");
+    }
 }
