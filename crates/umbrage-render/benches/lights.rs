@@ -21,7 +21,7 @@ use umbrage_wgpu::{Casters, ShadowOptions};
 type Failure = Box<dyn std::error::Error>;
 
 /// Number of frames of each motion. The first two do not count.
-const FRAMES: u32 = 32;
+const FRAMES: u32 = 22;
 
 /// What moves from frame to frame.
 #[derive(Clone, Copy)]
@@ -123,7 +123,8 @@ fn run(
         drawn.iter().flatten().map(value).fold(0.0, |a, b| a + b) / drawn.len() as f64
     };
     println!(
-        "plan {:.3} ms, maps {:.3} ms; {} of {} maps used, drawn {:.1} with {:.0} draws of {:.0} triangles, {:.1} MiB",
+        "plan {:.3} ms, maps {:.3} ms; {} of {} maps used, drawn {:.1} with {:.0} draws of {:.0} \
+         triangles, {:.1} MiB",
         median(planning),
         median(drawing),
         maps[0],

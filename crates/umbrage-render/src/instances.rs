@@ -76,8 +76,8 @@ impl Instances {
         first_draw..self.draws.len()
     }
 
-    /// Adds all instances whose box `is_drawn`, the nearest to `eye` (world space, metres) first, so
-    /// that few fragments are shaded which others hide. The farthest corner of a box counts, so that
+    /// Adds all instances whose box `is_drawn`, the nearest to `eye` (world space, metres) first:
+    /// few fragments are then shaded that others hide. The farthest corner of a box counts, so that
     /// ground and walls follow what stands before them.
     pub(crate) fn add_nearest_first(
         &mut self,
