@@ -8,6 +8,7 @@
 
 mod error;
 mod gpu;
+mod instances;
 mod points;
 mod renderer;
 mod samples;

@@ -1,3 +1,4 @@
+use crate::instances::{Draw, DrawList, Instances};
 use crate::points::Points;
 use crate::scene::{Attributes, SceneBuffers};
 use crate::timer::Timer;
@@ -6,8 +7,7 @@ use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::mem::{offset_of, size_of};
-use std::ops::Range;
-use umbrage::{Camera, Light, Plan, ShadowMap};
+use umbrage::{Camera, Light, Plan};
 use umbrage_wgpu::{
     CasterInstance, Casters, DEPTH_FORMAT, Frame, Mask, MeshCasters, MeshKind, ShadowOptions,
     Shadows, Support,
@@ -40,7 +40,7 @@ pub struct Renderer<'g, 's> {
     shader: ShaderModule,
     layout: PipelineLayout,
     /// Pipelines by the names of their fragment shaders, made at first use.
-    pictures: HashMap<&'static str, [RenderPipeline; 2]>,
+    pictures: HashMap<&'static str, Pipelines>,
     instances: Instances,
     eye: DVec3,
 }
@@ -63,75 +63,6 @@ pub struct Drawn {
     pub draws: u32,
     /// Number of triangles, counted once for each instance.
     pub triangles: u64,
-}
-
-/// Lists of instances to draw, one after the other.
-struct Instances {
-    list: Vec<CasterInstance>,
-    draws: Vec<Draw>,
-    buffer: Buffer,
-}
-
-/// A draw call: several instances of one mesh.
-#[derive(Clone, Debug)]
-struct Draw {
-    mesh: usize,
-    instances: Range<u32>,
-}
-
-/// A range of draws: those of a map, or those of the picture.
-type DrawList = Range<usize>;
-
-impl Instances {
-    fn clear(&mut self) {
-        self.list.clear();
-        self.draws.clear();
-    }
-
-    /// Adds all instances for which `is_drawn` is true, with one draw for those of one mesh.
-    fn add(
-        &mut self,
-        scene: &SceneBuffers<'_>,
-        eye: DVec3,
-        is_drawn: impl Fn(usize) -> bool,
-    ) -> DrawList {
-        let first_draw = self.draws.len();
-        for &i in scene.by_mesh.iter().filter(|&&i| is_drawn(i)) {
-            let instance = &scene.scene().instances[i];
-            let index = self.list.len() as u32;
-            self.list.push(CasterInstance::new(&instance.world_from_mesh, eye));
-            match self.draws[first_draw..].last_mut() {
-                Some(draw) if draw.mesh == instance.mesh => draw.instances.end = index + 1,
-                _ => self.draws.push(Draw { mesh: instance.mesh, instances: index..index + 1 }),
-            }
-        }
-        first_draw..self.draws.len()
-    }
-
-    fn upload(&mut self, gpu: &Gpu) -> Result<(), Error> {
-        let bytes: &[u8] = bytemuck::cast_slice(&self.list);
-        if self.buffer.size() < bytes.len() as u64 {
-            let max = gpu.device().limits().max_buffer_size;
-            if bytes.len() as u64 > max {
-                return Err(Error::TooLarge {
-                    what: format!("the list of {} instances to draw", self.list.len()),
-                    problem: format!("a buffer holds at most {max} bytes"),
-                });
-            }
-            self.buffer = instance_buffer(gpu, (bytes.len() as u64).next_power_of_two().min(max));
-        }
-        gpu.queue().write_buffer(&self.buffer, 0, bytes);
-        Ok(())
-    }
-}
-
-fn instance_buffer(gpu: &Gpu, size: u64) -> Buffer {
-    gpu.device().create_buffer(&BufferDescriptor {
-        label: Some("instances"),
-        size,
-        usage: BufferUsages::VERTEX | BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
 }
 
 const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
@@ -248,8 +179,6 @@ impl<'g, 's> Renderer<'g, 's> {
             ],
             immediate_size: 0,
         });
-        let instances =
-            Instances { list: Vec::new(), draws: Vec::new(), buffer: instance_buffer(gpu, 4096) };
         gpu.check()?;
         Ok(Self {
             gpu,
@@ -264,7 +193,7 @@ impl<'g, 's> Renderer<'g, 's> {
             shader,
             layout,
             pictures: HashMap::new(),
-            instances,
+            instances: Instances::new(gpu),
             eye: DVec3::ZERO,
         })
     }
@@ -289,40 +218,33 @@ impl<'g, 's> Renderer<'g, 's> {
         let frame = Frame { plan, render_origin: plan.origin, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = plan.origin;
-        instances.clear();
-        let casts = |map: &ShadowMap, i: usize| map.may_cast(scene.boxes[i]);
-        let lists: Vec<(usize, DrawList)> = prepared
+        instances.begin(scene, plan.origin);
+        let lists: Vec<DrawList> = prepared
             .stale()
-            .map(|map| {
-                let list = instances.add(scene, plan.origin, |i| casts(&plan.maps[map], i));
-                (map, list)
-            })
+            .map(|redraw| instances.add(scene, |aabb| redraw.may_cast(aabb)))
             .collect();
-        let mut drawn = Vec::with_capacity(lists.len());
+        let mut drawn: Vec<(usize, Drawn)> = Vec::with_capacity(lists.len());
         if lists.is_empty() {
             return Ok(drawn);
         }
         instances.upload(gpu)?;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
         let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
+        let mut lists = lists.into_iter();
         prepared.encode(&mut encoder, &timestamps, |map| {
-            let list = lists.iter().find(|(index, _)| *index == map.index);
-            let draws = list.map_or(&[][..], |(_, list)| &instances.draws[list.clone()]);
-            let mut into_map = Drawn::default();
-            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, &mut into_map);
-            for draw in draws {
-                let material = scene.meshes[draw.mesh].material;
-                let mask = masks[material].as_ref();
-                let casters = if mask.is_some() { &*masked } else { &*opaque };
-                drawer.choose(usize::from(mask.is_some()), |pass| {
-                    pass.set_pipeline(casters.pipeline());
-                });
-                if let Some(mask) = mask {
-                    drawer.pass.set_bind_group(1, mask, &[]);
-                }
+            let index = map.redraw.index;
+            if drawn.last().is_none_or(|&(last, _)| last != index) {
+                drawn.push((index, Drawn::default()));
+            }
+            let Some((list, (_, into_map))) = lists.next().zip(drawn.last_mut()) else { return };
+            let mut drawer = Drawer::new(scene, instances, &mut *map.pass, into_map);
+            for draw in instances.draws(list) {
+                let is_masked = scene.is_masked(draw.mesh);
+                let casters = if is_masked { &*masked } else { &*opaque };
+                drawer.choose(is_masked, casters.pipeline());
+                drawer.bind(1, draw.mesh, |material| masks[material].as_ref());
                 drawer.draw(draw);
             }
-            drawn.push((map.index, into_map));
         });
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
@@ -357,12 +279,8 @@ impl<'g, 's> Renderer<'g, 's> {
         Ok(drawn)
     }
 
-    /// The pipelines for meshes and sky, with the fragment shaders `mesh_NAME` and `sky_NAME`.
-    pub(crate) fn pipelines(
-        &mut self,
-        name: &'static str,
-        formats: &[TextureFormat],
-    ) -> [RenderPipeline; 2] {
+    /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
+    pub(crate) fn pipelines(&mut self, name: &'static str, formats: &[TextureFormat]) -> Pipelines {
         let Self { gpu, shader, layout, pictures, .. } = self;
         let made = || pipelines(gpu, shader, layout, name, formats);
         pictures.entry(name).or_insert_with(made).clone()
@@ -387,9 +305,9 @@ impl<'g, 's> Renderer<'g, 's> {
         let view = ViewUniform::new(camera, light, light_index, tile);
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
         let planes = tile.planes(camera);
-        instances.clear();
-        let list = instances.add(scene, camera.eye(), |i| {
-            planes.iter().all(|p| p.may_touch(scene.boxes[i])) && !scene.boxes[i].is_empty()
+        instances.begin(scene, camera.eye());
+        let list = instances.add_nearest_first(scene, camera.eye(), |aabb| {
+            planes.iter().all(|p| p.may_touch(aabb))
         });
         instances.upload(gpu)?;
         let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
@@ -408,15 +326,15 @@ impl<'g, 's> Renderer<'g, 's> {
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
         let mut drawn = Drawn::default();
-        let [mesh_pipeline, sky_pipeline] = target.pipelines;
+        let Pipelines { opaque, masked, sky } = target.pipelines;
         let mut drawer = Drawer::new(scene, instances, &mut pass, &mut drawn);
-        for draw in &instances.draws[list] {
-            let material = scene.meshes[draw.mesh].material;
-            drawer.choose(0, |pass| pass.set_pipeline(mesh_pipeline));
-            drawer.pass.set_bind_group(2, &scene.materials[material].bind_group, &[]);
+        for draw in instances.draws(list) {
+            let is_masked = scene.is_masked(draw.mesh);
+            drawer.choose(is_masked, if is_masked { masked } else { opaque });
+            drawer.bind(2, draw.mesh, |material| Some(&scene.materials[material].bind_group));
             drawer.draw(draw);
         }
-        pass.set_pipeline(sky_pipeline);
+        pass.set_pipeline(sky);
         if let Some(any) = scene.materials.first() {
             pass.set_bind_group(2, &any.bind_group, &[]);
             pass.draw(0..3, 0..1);
@@ -507,8 +425,18 @@ impl FrameTarget {
 pub(crate) struct Target<'a> {
     pub(crate) color: &'a [&'a TextureView],
     pub(crate) depth: &'a TextureView,
-    /// The pipeline for meshes, and the one for the sky.
-    pub(crate) pipelines: &'a [RenderPipeline; 2],
+    pub(crate) pipelines: &'a Pipelines,
+}
+
+/// The pipelines that draw a picture.
+#[derive(Clone)]
+pub(crate) struct Pipelines {
+    /// For meshes without holes. Its fragment stage does not discard, so the device tests depth
+    /// first and shades no fragment that is hidden by what is already drawn.
+    opaque: RenderPipeline,
+    /// For meshes with holes.
+    masked: RenderPipeline,
+    sky: RenderPipeline,
 }
 
 /// Draws meshes into a pass. The vertex buffers are set once.
@@ -516,7 +444,10 @@ struct Drawer<'a, 'p, 'e> {
     scene: &'a SceneBuffers<'a>,
     pass: &'p mut RenderPass<'e>,
     drawn: &'p mut Drawn,
-    chosen: Option<usize>,
+    /// Whether the pipeline for meshes with holes was set last.
+    is_masked: Option<bool>,
+    /// The material that was bound last.
+    material: Option<usize>,
 }
 
 impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
@@ -530,14 +461,30 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
         pass.set_vertex_buffer(1, instances.buffer.slice(..));
         pass.set_vertex_buffer(2, scene.attributes.slice(..));
         pass.set_index_buffer(scene.indices.slice(..), IndexFormat::Uint32);
-        Self { scene, pass, drawn, chosen: None }
+        Self { scene, pass, drawn, is_masked: None, material: None }
     }
 
-    /// Sets a pipeline if another one was used last.
-    fn choose(&mut self, which: usize, set: impl FnOnce(&mut RenderPass<'_>)) {
-        if self.chosen != Some(which) {
-            set(self.pass);
-            self.chosen = Some(which);
+    /// Sets the pipeline for meshes with or without holes if the other one was set last.
+    fn choose(&mut self, is_masked: bool, pipeline: &RenderPipeline) {
+        if self.is_masked != Some(is_masked) {
+            self.pass.set_pipeline(pipeline);
+            self.is_masked = Some(is_masked);
+        }
+    }
+
+    /// Binds what `group_of` the mesh's material gives, if another material was bound last.
+    fn bind<'b>(
+        &mut self,
+        group: u32,
+        mesh: usize,
+        group_of: impl FnOnce(usize) -> Option<&'b BindGroup>,
+    ) {
+        let material = self.scene.meshes[mesh].material;
+        if self.material != Some(material) {
+            if let Some(bind_group) = group_of(material) {
+                self.pass.set_bind_group(group, bind_group, &[]);
+            }
+            self.material = Some(material);
         }
     }
 
@@ -560,17 +507,17 @@ fn pipelines(
     layout: &PipelineLayout,
     name: &str,
     formats: &[TextureFormat],
-) -> [RenderPipeline; 2] {
+) -> Pipelines {
     let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
     let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(ATTRIBUTES)];
-    let pipeline = |what: &str, buffers: &[Option<VertexBufferLayout<'_>>], compare| {
-        let [vertex, fragment] = [format!("{what}_vertex"), format!("{what}_{name}")];
+    let pipeline = |vertex, what: &str, buffers: &[Option<VertexBufferLayout<'_>>], compare| {
+        let fragment = format!("{what}_{name}");
         gpu.device().create_render_pipeline(&RenderPipelineDescriptor {
             label: Some(&fragment),
             layout: Some(layout),
             vertex: VertexState {
                 module,
-                entry_point: Some(&vertex),
+                entry_point: Some(vertex),
                 compilation_options: PipelineCompilationOptions::default(),
                 buffers,
             },
@@ -595,10 +542,11 @@ fn pipelines(
         })
     };
     // Depth is reversed.
-    [
-        pipeline("mesh", &buffers, CompareFunction::Greater),
-        pipeline("sky", &[], CompareFunction::GreaterEqual),
-    ]
+    Pipelines {
+        opaque: pipeline("mesh_vertex", "opaque", &buffers, CompareFunction::Greater),
+        masked: pipeline("mesh_vertex", "masked", &buffers, CompareFunction::Greater),
+        sky: pipeline("sky_vertex", "sky", &[], CompareFunction::GreaterEqual),
+    }
 }
 
 fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {

@@ -1,6 +1,6 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
-use crate::renderer::{Renderer, Shading, Target};
+use crate::renderer::{Pipelines, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
 use glam::{Vec2, Vec3, Vec4};
@@ -143,8 +143,8 @@ impl Layers {
         renderer: &mut Renderer<'_, '_>,
         shading: &Shading<'_>,
         tile: &Tile,
-        picture: &[wgpu::RenderPipeline; 2],
-        texels: Option<&[wgpu::RenderPipeline; 2]>,
+        picture: &Pipelines,
+        texels: Option<&Pipelines>,
     ) -> Result<Vec<Sample>, Error> {
         let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
         let [first, second, depth] = [&self.color[0], &self.color[1], &self.depth].map(view);

@@ -1,6 +1,6 @@
 use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture, Wrap};
@@ -23,10 +23,17 @@ pub struct SceneBuffers<'a> {
     pub(crate) meshes: Vec<MeshRange>,
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) material_layout: BindGroupLayout,
-    /// The box of each instance, world space, metres.
-    pub(crate) boxes: Vec<Aabb>,
-    /// Indices of the instances, those of one mesh next to each other.
-    pub(crate) by_mesh: Vec<usize>,
+    /// The instances that have triangles, those of one mesh next to each other.
+    pub(crate) instances: Vec<Drawable>,
+}
+
+/// An instance of a mesh.
+pub(crate) struct Drawable {
+    /// Index of the mesh.
+    pub(crate) mesh: usize,
+    pub(crate) world_from_mesh: DAffine3,
+    /// World space, metres.
+    pub(crate) bounds: Aabb,
 }
 
 /// The range of a mesh in the buffers.
@@ -115,8 +122,14 @@ impl<'a> SceneBuffers<'a> {
             range
         });
         let meshes: Vec<MeshRange> = meshes.collect();
-        let mut by_mesh: Vec<usize> = (0..scene.instances.len()).collect();
-        by_mesh.sort_by_key(|&i| scene.instances[i].mesh);
+        let boxes = scene.instance_boxes();
+        let drawable = scene.instances.iter().zip(boxes).map(|(instance, bounds)| Drawable {
+            mesh: instance.mesh,
+            world_from_mesh: instance.world_from_mesh,
+            bounds,
+        });
+        let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
+        instances.sort_by_key(|i| i.mesh);
         let buffers = Self {
             scene,
             positions: gpu.buffer(
@@ -133,8 +146,7 @@ impl<'a> SceneBuffers<'a> {
             meshes,
             materials: materials.list,
             material_layout,
-            boxes: scene.instance_boxes(),
-            by_mesh,
+            instances,
         };
         gpu.check()?;
         Ok(buffers)
@@ -143,6 +155,11 @@ impl<'a> SceneBuffers<'a> {
     /// The scene that was uploaded.
     pub fn scene(&self) -> &'a Scene {
         self.scene
+    }
+
+    /// Whether a mesh has holes where its material's alpha is low.
+    pub(crate) fn is_masked(&self, mesh: usize) -> bool {
+        self.materials[self.meshes[mesh].material].mask.is_some()
     }
 
     /// Memory of vertices and indices, bytes.

@@ -2,7 +2,8 @@
 //! say.
 
 use glam::{DVec3, Vec3};
-use umbrage::Aabb;
+use std::collections::HashSet;
+use umbrage::{Aabb, Light};
 use umbrage_scene::{BuiltinInfo, Scene, SceneError, builtin, builtins, closed_form};
 
 fn small(info: &BuiltinInfo) -> u32 {
@@ -84,6 +85,25 @@ fn bounds_are_those_of_all_corners() {
         let (bounds, expected) = (scene.bounds(), Aabb::around(corners));
         let off = (bounds.min - expected.min).abs().max((bounds.max - expected.max).abs());
         assert!(off.max_element() < 1e-9, "{}: {bounds:?}, not {expected:?}", info.name);
+    }
+}
+
+#[test]
+fn lamps_have_as_many_lights_as_promised() {
+    let scene = builtin("lamps", None).unwrap();
+    let count = |is: fn(&Light) -> bool| scene.lights.iter().filter(|l| is(&l.light)).count();
+    assert_eq!(count(|l| matches!(l, Light::Spot(_))), 64);
+    assert_eq!(count(|l| matches!(l, Light::Point(_))), 8);
+    let names: HashSet<&str> = scene.lights.iter().map(|l| l.name.as_str()).collect();
+    assert_eq!(names.len(), scene.lights.len());
+    // Every light reaches the floor.
+    for light in &scene.lights {
+        let reach = match light.light {
+            Light::Spot(spot) => spot.position.y + spot.range * spot.direction.normalize().y,
+            Light::Point(point) => point.position.y - point.range,
+            Light::Directional { .. } => panic!("no sun at night"),
+        };
+        assert!(reach < 0.0, "{light:?}");
     }
 }
 

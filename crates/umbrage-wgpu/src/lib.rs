@@ -34,9 +34,17 @@
 //! # What a frame costs
 //!
 //! A map whose matrix, size and casters are as they were is not drawn again. With
-//! [`Casters::Unmoved`] and a camera that does not move, nothing is encoded at all. Empty maps have
-//! no texels and no pass. Buffers grow and are kept; the texture is made anew only where a map
-//! outgrows its place in it.
+//! [`Casters::Unmoved`] and a camera that does not move, nothing is encoded at all. With
+//! [`Casters::MovedIn`], only the texels that the moved casters can cast into are drawn again, with
+//! all casters whose boxes meet the beams through them ([`MapPass::may_cast`]). Prefilters encode
+//! and blur only these texels and those within reach of the blur. The maps are the same, bit by
+//! bit, as if all of them had been drawn. For one walking character in a forest of 640 000
+//! triangles that is 0.02 to 0.2 of the triangles, and 0.01 of the time or less on a device that
+//! draws in software. A map whose matrix changes, as maps do that follow a moving camera, is drawn
+//! as a whole.
+//!
+//! A light that nothing seen is in has empty maps, which have no texels, no pass and no upload.
+//! Buffers grow and are kept; the texture is made anew only where a map outgrows its place in it.
 //!
 //! # Losing the device
 //!
@@ -48,10 +56,12 @@ mod casters;
 // The recipes are compiled and run by the tests in `tests/gpu/cookbook.rs`.
 #[cfg(all(doc, not(doctest)))]
 pub mod cookbook;
+mod culling;
 mod data;
 mod error;
 mod passes;
 mod prefilter;
+mod redraw;
 mod shadows;
 mod slots;
 mod support;
@@ -60,6 +70,7 @@ mod wgsl;
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
+pub use redraw::Redraw;
 pub use shadows::{Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, ShadowOptions, Shadows};
 pub use support::Support;
 

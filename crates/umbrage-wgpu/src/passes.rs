@@ -1,9 +1,10 @@
 //! The passes that draw casters into maps.
 
+use crate::redraw::{Redraw, Stale, Texels};
 use crate::shadows::{Record, Shadows, depth_state};
 use glam::{DVec3, Mat4};
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Place, Plan, ShadowMap};
+use umbrage::{Aabb, Place, Plan};
 use wgpu::{
     CommandEncoder, CompareFunction, Device, LoadOp, Operations, PipelineCompilationOptions,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassDepthStencilAttachment,
@@ -20,18 +21,15 @@ pub struct Prepared<'a> {
     pub(crate) render_origin: DVec3,
 }
 
-/// One map's part of a depth pass. The map's matrix is already bound in bind group 0, as
-/// [`Shadows::caster_wgsl`] uses it. Viewport and scissor rectangle are already set; do not change
-/// them.
+/// One map's part of a depth pass, or a part of that. The map's matrix is already bound in bind
+/// group 0, as [`Shadows::caster_wgsl`] uses it. Viewport and scissor rectangle are already set; do
+/// not change them.
 #[derive(Debug)]
 pub struct MapPass<'p, 'e> {
     /// The render pass into which you draw the casters.
     pub pass: &'p mut RenderPass<'e>,
-    /// The planned map. Its caster planes tell which casters can be culled;
-    /// [`may_cast`](Self::may_cast) tests boxes against them.
-    pub shadow_map: &'p ShadowMap,
-    /// The index of the map in the plan.
-    pub index: usize,
+    /// The map, and what of it is drawn.
+    pub redraw: Redraw<'p>,
     /// The matrix from render space to the pass's clip space, for pipelines that do not read it
     /// from bind group 0.
     pub clip_from_render: Mat4,
@@ -40,11 +38,10 @@ pub struct MapPass<'p, 'e> {
 }
 
 impl MapPass<'_, '_> {
-    /// Whether anything in `aabb` (world space) can cast a shadow into the map. The result is
-    /// conservative: it is never `false` for a box that can cast into the map, but may be `true`
-    /// for one that cannot.
+    /// Whether anything in `aabb` (world space) can cast a shadow into what is drawn: see
+    /// [`Redraw::may_cast`].
     pub fn may_cast(&self, aabb: Aabb) -> bool {
-        self.shadow_map.may_cast(aabb)
+        self.redraw.may_cast(aabb)
     }
 }
 
@@ -76,16 +73,25 @@ pub(crate) fn part<'a>(
 }
 
 impl Prepared<'_> {
-    /// Indices in the plan of the maps that [`encode`](Self::encode) will draw. All other maps are
-    /// empty or already drawn.
-    pub fn stale(&self) -> impl Iterator<Item = usize> + '_ {
-        let records = self.shadows.records.iter().enumerate();
-        records.filter(|(_, r)| r.stale_place().is_some()).map(|(index, _)| index)
+    /// What [`encode`](Self::encode) will draw, in the same order, for renderers that cull ahead of
+    /// the pass. All other maps and parts of maps are empty or already drawn.
+    pub fn stale(&self) -> impl Iterator<Item = Redraw<'_>> {
+        let filter = self.shadows.options().filter;
+        self.shadows.records.iter().enumerate().flat_map(move |(index, record)| {
+            let place = record.stale_place();
+            let redraw = move |place| {
+                let map = &self.plan.maps[index];
+                let parts = record.stale.parts();
+                parts.map(move |texels| Redraw::new(map, index, record, place, &filter, texels))
+            };
+            place.into_iter().flat_map(redraw)
+        })
     }
 
-    /// Encodes the passes that draw the maps. `draw` is called once for each map and must draw all
-    /// casters of that map. Maps that have not changed and empty maps are left out. If no map is
-    /// left, no pass is encoded and no timestamp is written.
+    /// Encodes the passes that draw the maps. `draw` is called once for each map, or for each part
+    /// of a map in which casters have moved, and must draw all casters that may cast into it. Maps
+    /// that have not changed and empty maps are left out. If no map is left, no pass is encoded and
+    /// no timestamp is written.
     ///
     /// Returns the number of maps drawn. Submit these passes in the same encoder as the passes that
     /// look the maps up, ahead of those, or in an earlier submission.
@@ -111,37 +117,46 @@ impl Prepared<'_> {
         for layer in stale_layers() {
             // If all maps of a layer are drawn, clearing the whole layer costs least.
             let in_layer = |r: &&Record| r.place.is_some_and(|p| p.layer as usize == layer);
-            let is_whole = records.iter().filter(in_layer).all(|r| r.stale_place().is_some());
+            let is_whole = records.iter().filter(in_layer).all(|r| r.is_wholly_stale(&filter));
             let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
             let [is_first, is_last] = [Some(layer) == first, Some(layer) == last];
             let writes = part(timestamps.depth.as_ref(), is_first, is_last);
             let mut pass = begin(encoder, &texture.layers[layer], load, writes);
             for (index, record, place) in stale_in(layer) {
-                aim(&mut pass, &place, &filter);
-                if !is_whole {
-                    pass.set_pipeline(&clear.pipeline);
-                    pass.draw(0..3, 0..1);
+                let aim = Aim::new(&place, &filter, 0, [0; 2]);
+                aim.set_viewport(&mut pass);
+                for texels in record.stale.parts() {
+                    aim.set_scissor(&mut pass, texels, [0; 2]);
+                    if !is_whole {
+                        pass.set_pipeline(&clear.pipeline);
+                        pass.draw(0..3, 0..1);
+                    }
+                    let offset = record.stale_index * casters.stride;
+                    pass.set_bind_group(0, &casters.bind_group, &[offset]);
+                    draw(&mut MapPass {
+                        pass: &mut pass,
+                        redraw: Redraw::new(
+                            &plan.maps[index],
+                            index,
+                            record,
+                            place,
+                            &filter,
+                            texels,
+                        ),
+                        clip_from_render: record.clip_from_render.as_mat4(),
+                        render_origin,
+                    });
                 }
-                pass.set_bind_group(0, &casters.bind_group, &[index as u32 * casters.stride]);
-                draw(&mut MapPass {
-                    pass: &mut pass,
-                    shadow_map: &plan.maps[index],
-                    index,
-                    clip_from_render: record.clip_from_render.as_mat4(),
-                    render_origin,
-                });
                 drawn += 1;
             }
             drop(pass);
             if let Some(prefiltering) = prefiltering {
-                let stale = stale_in(layer).map(|(index, _, place)| (index, place));
+                let stale = stale_in(layer).map(|(_, record, place)| (record, place));
                 let writes = part(timestamps.filter.as_ref(), is_first, is_last);
                 prefiltering.encode(encoder, layer, &stale, &filter, writes.as_ref());
             }
         }
-        for record in records.iter_mut() {
-            record.is_drawn = record.place.is_some();
-        }
+        records.iter_mut().for_each(|record| record.stale = Stale::default());
         texture.is_fresh &= drawn == 0;
         drawn
     }
@@ -167,26 +182,50 @@ fn begin<'e>(
     })
 }
 
-/// Sets viewport and scissor rectangle to the texels that are drawn for a map, its gutter included.
-fn aim(pass: &mut RenderPass<'_>, place: &Place, filter: &Filter) {
-    aim_level(pass, place, filter, 0, [0; 2]);
+/// Where a mip level of a map lies in its texture.
+pub(crate) struct Aim {
+    level: u32,
+    /// The first texel of the drawn rectangle.
+    origin: [u32; 2],
+    /// The texels that are drawn if all of the map is, counted from `origin`.
+    drawn: Texels,
 }
 
-/// Sets viewport and scissor rectangle in mip level `level`, and leaves out `inset` texels of that
-/// level at each side.
-pub(crate) fn aim_level(
-    pass: &mut RenderPass<'_>,
-    place: &Place,
-    filter: &Filter,
-    level: u32,
-    inset: [u32; 2],
-) {
-    let gutter = filter.reach_texels();
-    let drawn = filter.drawn_texels(place.size);
-    let [x, y] = [0, 1].map(|i| ((place.origin[i] - gutter) >> level) + inset[i]);
-    let [w, h] = [0, 1].map(|i| (drawn[i] >> level) - 2 * inset[i]);
-    pass.set_viewport(x as f32, y as f32, w as f32, h as f32, 0.0, 1.0);
-    pass.set_scissor_rect(x, y, w, h);
+impl Aim {
+    /// Mip level `level` of the texels that are drawn for a map, without `inset` texels of that
+    /// level at each side.
+    pub(crate) fn new(place: &Place, filter: &Filter, level: u32, inset: [u32; 2]) -> Self {
+        let gutter = filter.reach_texels();
+        let size = filter.drawn_texels(place.size);
+        Self {
+            level,
+            origin: place.origin.map(|n| (n - gutter) >> level),
+            drawn: Texels { first: inset, end: [0, 1].map(|i| (size[i] >> level) - inset[i]) },
+        }
+    }
+
+    pub(crate) fn set_viewport(&self, pass: &mut RenderPass<'_>) {
+        let [x, y] = [0, 1].map(|i| (self.origin[i] + self.drawn.first[i]) as f32);
+        let [width, height] = self.drawn.size().map(|n| n as f32);
+        pass.set_viewport(x, y, width, height, 0.0, 1.0);
+    }
+
+    /// Sets the scissor rectangle to what depends on `texels` of the map itself, and `reach` texels
+    /// of this level beside it. Returns `false` if nothing of that is drawn.
+    pub(crate) fn set_scissor(
+        &self,
+        pass: &mut RenderPass<'_>,
+        texels: Texels,
+        reach: [u32; 2],
+    ) -> bool {
+        let drawn = texels.at_level(self.level, reach).within(self.drawn);
+        if let Some(drawn) = drawn {
+            let [x, y] = [0, 1].map(|i| self.origin[i] + drawn.first[i]);
+            let [width, height] = drawn.size();
+            pass.set_scissor_rect(x, y, width, height);
+        }
+        drawn.is_some()
+    }
 }
 
 /// The pipeline that clears one map in a layer whose other maps stay.

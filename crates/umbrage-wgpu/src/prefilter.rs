@@ -1,7 +1,7 @@
 //! The passes of prefilters.
 
 use crate::data::PrefilterMap;
-use crate::passes::{aim_level, part};
+use crate::passes::{Aim, part};
 use crate::shadows::{DepthTexture, Record};
 use crate::wgsl::{self, PrefilterPass};
 use crate::{Error, Support};
@@ -210,7 +210,7 @@ impl Prefiltering {
         );
     }
 
-    /// Uploads the places and depth ranges of the maps for the passes.
+    /// Uploads the places and depth ranges of the stale maps for the passes.
     pub(crate) fn upload(
         &mut self,
         device: &Device,
@@ -221,51 +221,60 @@ impl Prefiltering {
     ) {
         let stride = self.stride as usize;
         self.bytes.clear();
-        self.bytes.resize(stride * records.len(), 0);
-        let maps = plan.maps.iter().zip(records).zip(self.bytes.chunks_exact_mut(stride));
-        for ((map, record), bytes) in maps {
-            if let Some(place) = record.place {
+        for (map, record) in plan.maps.iter().zip(records) {
+            if let Some(place) = record.stale_place() {
                 let uniform = PrefilterMap::new(map, &place, self.textures);
-                bytes[..size_of::<PrefilterMap>()].copy_from_slice(bytemuck::bytes_of(&uniform));
+                self.bytes.extend_from_slice(bytemuck::bytes_of(&uniform));
+                self.bytes.resize(self.bytes.len().next_multiple_of(stride), 0);
             }
         }
         if self.uniforms.size() < self.bytes.len() as u64 {
-            self.uniforms =
-                uniforms(device, self.stride * records.len().next_power_of_two() as u32);
+            self.uniforms = uniforms(device, self.bytes.len().next_power_of_two() as u32);
             self.rebind(device, depths);
         }
         queue.write_buffer(&self.uniforms, 0, &self.bytes);
     }
 
-    /// Encodes and blurs the stale maps of a layer. `timestamps` has the beginning only if this
-    /// layer is the first, and the end only if it is the last.
-    pub(crate) fn encode(
+    /// Encodes and blurs what is stale of the maps of a layer. `timestamps` has the beginning only
+    /// if this layer is the first, and the end only if it is the last.
+    pub(crate) fn encode<'a>(
         &self,
         encoder: &mut CommandEncoder,
         layer: usize,
-        stale: &(impl Iterator<Item = (usize, Place)> + Clone),
+        stale: &(impl Iterator<Item = (&'a Record, Place)> + Clone),
         filter: &Filter,
         timestamps: Option<&RenderPassTimestampWrites<'_>>,
     ) {
         let statistics = &self.statistics.layers;
         let Bindings { depths, statistics: sources, scratch: blurred } = &self.bindings;
         // Each step has pipelines, the bind group that they read, the views that they draw into,
-        // the mip level, and the inset: the texels at each side that are left out because the blur
-        // would read beyond the drawn texels there. Lookups do not reach the texels that are left
-        // out.
+        // the mip level, and two numbers of texels in s and t. The inset is left out at each side,
+        // because the blur would read beyond the drawn texels there; lookups do not reach so far.
+        // The reach is how far beside stale texels a step draws. The scratch texture keeps rows
+        // that are not stale, but their statistics are blurred in place: where the blur of rows
+        // reads them, they are encoded anew, and blurred along columns once more.
         let radius = self.radius;
-        let mut steps = vec![(&self.encode, &depths[layer], &statistics[0], 0, [0; 2])];
+        let mut steps =
+            vec![(&self.encode, &depths[layer], &statistics[0], 0, [0; 2], [2 * radius, 0])];
         if let (Some(scratch), Some(blurred)) = (&self.scratch, blurred) {
-            steps.push((&self.rows, &sources[0], &scratch.layers[0], 0, [radius, 0]));
-            steps.push((&self.columns, blurred, &statistics[0], 0, [radius; 2]));
+            let rows = &scratch.layers[0];
+            steps.push((&self.rows, &sources[0], rows, 0, [radius, 0], [radius, 0]));
+            steps.push((
+                &self.columns,
+                blurred,
+                &statistics[0],
+                0,
+                [radius; 2],
+                [2 * radius, radius],
+            ));
         }
         for level in 1..self.levels {
             let from = &sources[level as usize - 1];
-            steps.push((&self.halve, from, &statistics[level as usize], level, [0; 2]));
+            steps.push((&self.halve, from, &statistics[level as usize], level, [0; 2], [0; 2]));
         }
         let passes = steps.len() * self.groups.len();
         let mut index = 0;
-        for (pipelines, bindings, target, level, inset) in steps {
+        for (pipelines, bindings, target, level, inset, reach) in steps {
             for (pipeline, range) in pipelines.iter().zip(&self.groups) {
                 let first = layer * self.textures as usize;
                 let attachments: Vec<_> =
@@ -281,10 +290,15 @@ impl Prefiltering {
                     multiview_mask: None,
                 });
                 pass.set_pipeline(pipeline);
-                for (map, place) in stale.clone() {
-                    aim_level(&mut pass, &place, filter, self.first_level + level, inset);
-                    pass.set_bind_group(0, bindings, &[map as u32 * self.stride]);
-                    pass.draw(0..3, 0..1);
+                for (record, place) in stale.clone() {
+                    let aim = Aim::new(&place, filter, self.first_level + level, inset);
+                    aim.set_viewport(&mut pass);
+                    pass.set_bind_group(0, bindings, &[record.stale_index * self.stride]);
+                    for part in record.stale.parts() {
+                        if aim.set_scissor(&mut pass, part, reach) {
+                            pass.draw(0..3, 0..1);
+                        }
+                    }
                 }
             }
         }

@@ -1,8 +1,10 @@
 mod resources;
 
+use crate::culling::FourPlanes;
 use crate::data::{Lookup, Placed, clip_from_render};
 use crate::passes::{Clear, Prepared};
 use crate::prefilter::Prefiltering;
+use crate::redraw::{Stale, Texels};
 use crate::slots::Slots;
 use crate::{Error, Support, wgsl};
 use glam::{DMat4, DVec3};
@@ -91,8 +93,9 @@ pub enum Casters<'a> {
     /// Any caster may have moved, so all maps are drawn again.
     Moved,
     /// All casters that changed lie within these boxes (world space), which must contain both their
-    /// old and their new positions. Only maps into which something in the boxes can cast a shadow
-    /// are drawn again.
+    /// old and their new positions; two boxes for one caster are as good as one around both. Of
+    /// maps that are otherwise unchanged, only the texels that something in the boxes can cast a
+    /// shadow into are drawn again, part by part (see [`Redraw`](crate::Redraw)).
     MovedIn(&'a [Aabb]),
     /// No caster has moved.
     Unmoved,
@@ -126,38 +129,52 @@ pub struct Shadows {
 #[derive(Debug, Default)]
 pub(crate) struct Record {
     pub(crate) place: Option<Place>,
-    pub(crate) is_drawn: bool,
+    /// What must still be drawn.
+    pub(crate) stale: Stale,
+    /// If anything must be drawn, the index of the map among all such maps.
+    pub(crate) stale_index: u32,
     pub(crate) clip_from_render: DMat4,
     shadow_from_local: DMat4,
     origin: DVec3,
     slab: Slab,
     caster_planes: Vec<Plane>,
+    /// The same, to cull by.
+    pub(crate) four_planes: Vec<FourPlanes>,
 }
 
 impl Record {
-    /// Whether the texture holds `map` at `place` exactly as it is planned now.
+    /// Whether the texture holds `map` at `place` as it is planned now, but for what is stale.
     fn is_of(&self, map: &ShadowMap, place: Option<Place>) -> bool {
-        self.is_drawn
-            && self.place == place
+        self.place == place
             && self.shadow_from_local == map.shadow_from_local
             && self.origin == map.origin
             && self.slab == map.slab
             && self.caster_planes == map.caster_planes
     }
 
-    /// The map's place if it has one and must still be drawn there.
+    /// The map's place if it has one and something must still be drawn there.
     pub(crate) fn stale_place(&self) -> Option<Place> {
-        self.place.filter(|_| !self.is_drawn)
+        self.place.filter(|_| !self.stale.is_empty())
     }
 
-    fn set(&mut self, map: &ShadowMap, place: Option<Place>) {
-        self.is_drawn = false;
+    /// Whether the map must be drawn as a whole.
+    pub(crate) fn is_wholly_stale(&self, filter: &Filter) -> bool {
+        let is_whole = |place| self.stale.parts().eq([Texels::whole(filter, &place)]);
+        self.place.is_some_and(is_whole)
+    }
+
+    /// Notes that all of `map` must be drawn.
+    fn set(&mut self, map: &ShadowMap, place: Option<Place>, filter: &Filter) {
+        self.stale =
+            place.map_or(Stale::default(), |place| Stale::only(Texels::whole(filter, &place)));
         self.place = place;
         self.shadow_from_local = map.shadow_from_local;
         self.origin = map.origin;
         self.slab = map.slab;
         self.caster_planes.clear();
         self.caster_planes.extend_from_slice(&map.caster_planes);
+        self.four_planes.clear();
+        self.four_planes.extend(map.caster_planes.chunks(4).map(FourPlanes::new));
     }
 }
 
@@ -465,7 +482,8 @@ impl Shadows {
     ///   into the device's textures.
     /// - [`Error::TooMany`] if a device without storage buffers cannot take as many lights, maps or
     ///   planes.
-    /// - [`Error::Invalid`] if `frame.render_origin` is not finite.
+    /// - [`Error::Invalid`] if `frame.render_origin` is not finite, or a box of `frame.casters` is
+    ///   not within 1e12 metres of the world's origin.
     ///
     /// After an error, the maps that are drawn and the data that shaders read are as before.
     pub fn prepare<'a>(
@@ -486,6 +504,15 @@ impl Shadows {
                 field: "frame.render_origin",
                 problem: format!("must be finite, is {render_origin}"),
             });
+        }
+        if let Casters::MovedIn(boxes) = casters {
+            let is_sound = |b: &&Aabb| b.is_empty() || is_position(b.min) && is_position(b.max);
+            if let Some(bad) = boxes.iter().find(|b| !is_sound(b)) {
+                return Err(Error::Invalid {
+                    field: "frame.casters",
+                    problem: format!("must lie within 1e12 metres of the origin, is {bad:?}"),
+                });
+            }
         }
         if let Some(map) = plan.maps.iter().position(|m| m.rows != Rows::Even && !m.is_empty()) {
             return Err(Error::LogarithmicRows { map });
@@ -524,24 +551,23 @@ impl Shadows {
         }
 
         self.records.resize_with(plan.maps.len(), Record::default);
-        let mut any_stale = false;
+        let mut stale_maps = 0;
         for ((map, place), record) in
             plan.maps.iter().zip(self.slots.places()).zip(&mut self.records)
         {
-            let changed = match casters {
-                Casters::Moved => true,
-                Casters::MovedIn(boxes) => boxes.iter().any(|&b| map.may_cast(b)),
-                Casters::Unmoved => false,
-            };
-            if changed || self.texture.is_fresh || !record.is_of(map, *place) {
-                record.set(map, *place);
+            if self.texture.is_fresh || casters == Casters::Moved || !record.is_of(map, *place) {
+                record.set(map, *place, &filter);
+            } else if let Casters::MovedIn(boxes) = casters {
+                let shadowed = boxes.iter().filter_map(|&b| Texels::shadowed_by(map, &filter, b));
+                shadowed.for_each(|texels| record.stale.add(texels));
             }
             if record.stale_place().is_some() {
-                any_stale = true;
+                record.stale_index = stale_maps;
                 record.clip_from_render = clip_from_render(map, &filter, render_origin);
+                stale_maps += 1;
             }
         }
-        if any_stale {
+        if stale_maps > 0 {
             self.casters.upload(device, queue, &self.records);
             let Self { records, texture, prefiltering, .. } = &mut *self;
             if let Some(prefiltering) = prefiltering {
@@ -550,6 +576,12 @@ impl Shadows {
         }
         Ok(Prepared { shadows: self, plan, render_origin })
     }
+}
+
+/// Whether squares and products of a few of these coordinates stay finite, as the planner demands
+/// of positions, too.
+fn is_position(v: DVec3) -> bool {
+    v.is_finite() && v.abs().max_element() <= 1e12
 }
 
 /// Whether the texture unit compares depths.

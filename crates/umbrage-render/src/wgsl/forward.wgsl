@@ -38,7 +38,7 @@ const POINT: u32 = 2u;
 
 struct Material {
     base_color: vec4f,
-    // There is no surface where alpha is below this value; 0 for opaque materials.
+    // Where alpha is below this value, meshes with holes have no surface.
     cutoff: f32,
 }
 
@@ -109,14 +109,32 @@ struct Surface {
     visibility: f32,
 }
 
-fn surface(in: Fragment) -> Surface {
-    // Derivatives are taken first, before parts of a quad are discarded.
-    let normal = normalize_or_zero(shadow_normal(in.position));
+fn triangle_normal(in: Fragment) -> vec3f {
+    return normalize_or_zero(shadow_normal(in.position));
+}
+
+fn base_color(in: Fragment) -> vec4f {
     let texel = textureSampleLevel(material_texture, material_sampler, in.uv, 0.0);
-    let color = material.base_color * texel;
+    return material.base_color * texel;
+}
+
+fn opaque_surface(in: Fragment) -> Surface {
+    return surface(in, triangle_normal(in), base_color(in).rgb);
+}
+
+// A fragment stage that discards keeps the device from testing depth before it shades, so only
+// meshes with holes have one.
+fn masked_surface(in: Fragment) -> Surface {
+    // Derivatives are taken first, before parts of a quad are discarded.
+    let normal = triangle_normal(in);
+    let color = base_color(in);
     if (color.a < material.cutoff) {
         discard;
     }
+    return surface(in, normal, color.rgb);
+}
+
+fn surface(in: Fragment, normal: vec3f, color: vec3f) -> Surface {
     var shading_normal = normalize_or_zero(in.normal);
     if (all(shading_normal == vec3f(0.0))) {
         shading_normal = normal;
@@ -127,7 +145,7 @@ fn surface(in: Fragment) -> Surface {
     if (is_facing) {
         visibility = shadow_visibility(view.light_index, in.position, normal);
     }
-    return Surface(in.position, normal, shading_normal, color.rgb, is_facing, visibility);
+    return Surface(in.position, normal, shading_normal, color, is_facing, visibility);
 }
 
 fn to_light(position: vec3f) -> vec3f {
@@ -215,8 +233,17 @@ fn compress(linear: vec3f) -> vec3f {
 
 // A frame to display. The format of the target encodes it as sRGB.
 @fragment
-fn mesh_frame(in: Fragment) -> @location(0) vec4f {
-    return vec4f(compress(radiance(surface(in))), 1.0);
+fn opaque_frame(in: Fragment) -> @location(0) vec4f {
+    return frame(opaque_surface(in));
+}
+
+@fragment
+fn masked_frame(in: Fragment) -> @location(0) vec4f {
+    return frame(masked_surface(in));
+}
+
+fn frame(s: Surface) -> vec4f {
+    return vec4f(compress(radiance(s)), 1.0);
 }
 
 @fragment
@@ -232,8 +259,16 @@ struct Picture {
 }
 
 @fragment
-fn mesh_picture(in: Fragment) -> Picture {
-    let s = surface(in);
+fn opaque_picture(in: Fragment) -> Picture {
+    return picture(opaque_surface(in));
+}
+
+@fragment
+fn masked_picture(in: Fragment) -> Picture {
+    return picture(masked_surface(in));
+}
+
+fn picture(s: Surface) -> Picture {
     let visibility = select(-1.0, s.visibility, s.is_facing);
     let depth = dot(view.forward, s.position);
     return Picture(vec4f(radiance(s), visibility), vec4f(s.shading_normal, depth));
@@ -247,15 +282,23 @@ fn sky_picture(@builtin(position) at: vec4f) -> Picture {
 // Where texels lie: texel coordinates, index of the map in the plan (-1: none), and pixels per
 // texel (0: none).
 @fragment
-fn mesh_texels(in: Fragment) -> @location(0) vec4f {
-    let s = surface(in);
+fn opaque_texels(in: Fragment) -> @location(0) vec4f {
+    return texels(in.clip, opaque_surface(in));
+}
+
+@fragment
+fn masked_texels(in: Fragment) -> @location(0) vec4f {
+    return texels(in.clip, masked_surface(in));
+}
+
+fn texels(at: vec4f, s: Surface) -> vec4f {
     let place = shadow_place(view.light_index, s.position);
     if (place.map == SHADOW_NONE) {
         return vec4f(0.0, 0.0, -1.0, 0.0);
     }
     let point = shadow_point(place.map, s.position);
     // How the surface point moves on its plane from pixel to pixel.
-    let ray = view.ray + in.clip.x * view.ray_x + in.clip.y * view.ray_y;
+    let ray = view.ray + at.x * view.ray_x + at.y * view.ray_y;
     let across = dot(s.normal, ray);
     let depth = dot(view.forward, s.position);
     let step_x = depth * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));

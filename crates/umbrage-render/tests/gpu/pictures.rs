@@ -3,6 +3,7 @@
 use crate::{GPU, Set, scene};
 use umbrage::{Partition, Technique};
 use umbrage_render::{FrameTarget, Renderer, SceneBuffers, Shading, Timer};
+use umbrage_scene::{Alpha, Scene};
 use umbrage_testing::needs;
 use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -63,6 +64,36 @@ fn a_frame_looks_as_its_samples_do() {
     let pairs = read(&target).into_iter().zip(shade::pixels(&radiance, 1));
     assert_eq!(pairs.filter(far).count(), 0);
     assert!(samples.iter().all(|s| s.map.is_none() && s.error.is_nan()), "not asked for");
+}
+
+/// Meshes without holes are drawn without `discard`, and instances in another order than the
+/// scene's. Neither shows.
+#[needs(gpu)]
+#[test]
+fn order_and_pipelines_do_not_show() {
+    let original = scene("airfield:6");
+    let set = Set::new(&original, [320, 180]);
+    let light = set.light();
+    let plan = set.plan(&[light], &Technique::default());
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    let picture = |scene: &Scene| {
+        let buffers = SceneBuffers::new(&GPU, scene, false).unwrap();
+        let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        let target = FrameTarget::new(&GPU, set.camera.image()).unwrap();
+        let drawn = renderer.frame(&shading, &target, None).unwrap();
+        (read(&target), drawn.triangles)
+    };
+    let expected = picture(&original);
+    let [mut reversed, mut masked] = [original.clone(), original.clone()];
+    reversed.instances.reverse();
+    assert_eq!(picture(&reversed), expected);
+    // Masks without holes.
+    masked.materials.iter_mut().for_each(|m| m.alpha = Alpha::Mask { cutoff: 0.0 });
+    assert_eq!(picture(&masked), expected);
+    // The comparison sees holes.
+    masked.materials.iter_mut().for_each(|m| m.alpha = Alpha::Mask { cutoff: 1.5 });
+    assert_ne!(picture(&masked).0, expected.0);
 }
 
 /// Tiles, rows and grids only select samples.

@@ -5,6 +5,7 @@ pub mod closed_form;
 mod contacts;
 mod fence;
 mod grove;
+mod lamps;
 mod lantern;
 mod mesh_builder;
 mod plants;
@@ -80,6 +81,14 @@ const BUILTINS: &[BuiltinInfo] = &[
         default_size: 2,
         max_size: 200,
         build: lantern::lantern,
+    },
+    BuiltinInfo {
+        name: "lamps",
+        about: "A market hall at night under 64 spot lights and 8 point lights, for lights that share a plan",
+        size_means: "bays of the hall, with nine lights each",
+        default_size: 8,
+        max_size: 2000,
+        build: lamps::lamps,
     },
     BuiltinInfo {
         name: "contacts",

@@ -1,7 +1,7 @@
 use super::mesh_builder::MeshBuilder;
 use crate::types::{Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId};
 use glam::{DAffine3, DVec3, Vec3, Vec4};
-use umbrage::{Light, PointLight};
+use umbrage::{Light, PointLight, SpotLight};
 
 /// A scene under construction.
 pub(super) struct Stage {
@@ -95,6 +95,16 @@ impl Stage {
             light: Light::Directional { direction: direction.normalize() },
             color: Vec3::new(1.0, 0.93, 0.82),
             intensity: 100_000.0,
+        });
+    }
+
+    /// The white light of a lamp under a shade.
+    pub(super) fn lamp(&mut self, name: &str, light: SpotLight) {
+        self.scene.lights.push(SceneLight {
+            name: name.into(),
+            light: Light::Spot(light),
+            color: Vec3::new(1.0, 0.90, 0.74),
+            intensity: 400.0,
         });
     }
 

@@ -34,8 +34,8 @@ pub(super) struct Buffers {
     planes: Buffer,
 }
 
-/// The matrices with which casters are drawn into the maps, one every `stride` bytes, and the bind
-/// group that shows one of them.
+/// The matrices with which casters are drawn into the stale maps, one every `stride` bytes, and the
+/// bind group that shows one of them.
 #[derive(Debug)]
 pub(crate) struct CasterBuffer {
     pub(crate) layout: BindGroupLayout,
@@ -208,13 +208,13 @@ impl CasterBuffer {
     pub(super) fn upload(&mut self, device: &Device, queue: &Queue, records: &[Record]) {
         let stride = self.stride as usize;
         self.bytes.clear();
-        self.bytes.resize(stride * records.len(), 0);
-        for (record, bytes) in records.iter().zip(self.bytes.chunks_exact_mut(stride)) {
+        for record in records.iter().filter(|r| r.stale_place().is_some()) {
             let map = CasterMap { clip_from_render: record.clip_from_render.as_mat4() };
-            bytes[..size_of::<CasterMap>()].copy_from_slice(bytemuck::bytes_of(&map));
+            self.bytes.extend_from_slice(bytemuck::bytes_of(&map));
+            self.bytes.resize(self.bytes.len().next_multiple_of(stride), 0);
         }
         if self.buffer.size() < self.bytes.len() as u64 {
-            let bytes = stride * records.len().next_power_of_two();
+            let bytes = self.bytes.len().next_power_of_two();
             self.buffer = buffer(device, bytes, BufferUsages::UNIFORM);
             self.bind_group = Self::bind(device, &self.layout, &self.buffer);
         }

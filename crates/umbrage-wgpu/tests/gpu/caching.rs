@@ -3,7 +3,9 @@
 use crate::device::Bench;
 use crate::{EYE, bench, camera, lights, plan, sun};
 use glam::DVec3;
-use umbrage::{Aabb, Partition, Plan, Planner, Size, Technique, Warp};
+use umbrage::{
+    Aabb, Light, Partition, Plan, Planner, PointLight, ShadowMap, Size, SpotLight, Technique, Warp,
+};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
 
@@ -21,10 +23,11 @@ fn technique() -> Technique {
 fn drawn(bench: &Bench, shadows: &mut Shadows, plan: &Plan, casters: Casters<'_>) -> Vec<usize> {
     let frame = Frame { plan, render_origin: plan.origin, casters };
     let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
-    let stale: Vec<usize> = prepared.stale().collect();
+    let stale: Vec<usize> = prepared.stale().map(|r| r.index).collect();
     let mut encoder = bench.encoder();
     let mut drawn = Vec::new();
-    let count = prepared.encode(&mut encoder, &Timestamps::default(), |map| drawn.push(map.index));
+    let count =
+        prepared.encode(&mut encoder, &Timestamps::default(), |map| drawn.push(map.redraw.index));
     assert_eq!((count, &stale), (drawn.len(), &drawn));
     bench.finish(encoder);
     drawn
@@ -78,7 +81,7 @@ fn a_frame_that_is_not_encoded_is_drawn_the_next_time() {
     assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
 }
 
-/// Redrawing one map of an atlas clears that map and keeps the others.
+/// Redrawing a part of one map of an atlas clears that part and keeps everything else.
 #[needs(gpu)]
 #[test]
 fn a_map_that_is_redrawn_leaves_its_neighbours() {
@@ -115,16 +118,21 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
                 columns.map(move |x| row + x as usize)
             });
             let values: Vec<f32> = texels.map(|t| depths[t]).collect();
-            assert!(values.iter().all(|&v| v == values[0]), "map {i} is of one depth");
-            values[0]
+            assert!(values.iter().all(|v| [0.25, 1.0].contains(v)), "map {i} has two depths");
+            values.iter().filter(|&&v| v == 1.0).count()
         })
     };
-    assert_eq!(frame(Casters::Unmoved, true), [0.25; 3]);
+    assert_eq!(frame(Casters::Unmoved, true), [0; 3]);
     let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
     let boxes = [Aabb::around([far])];
-    let expected = [0, 1, 2].map(|i| if plan.maps[i].may_cast(boxes[0]) { 1.0 } else { 0.25 });
-    assert!(expected.contains(&0.25) && expected.contains(&1.0));
-    assert_eq!(frame(Casters::MovedIn(&boxes), false), expected);
+    let cleared = frame(Casters::MovedIn(&boxes), false);
+    for (map, cleared) in plan.maps.iter().zip(cleared) {
+        // A point, with a texel for rounding to each side.
+        assert_eq!((4..=9).contains(&cleared), map.may_cast(boxes[0]), "{cleared} texels");
+        assert!(cleared <= 9);
+    }
+    assert!(cleared.contains(&0) && cleared != [0; 3], "{cleared:?}");
+    assert_eq!(frame(Casters::Unmoved, false), cleared);
 }
 
 /// When the camera moves all the time, the sizes of the maps change all the time. Few new textures
@@ -185,4 +193,56 @@ fn empty_maps_cost_nothing() {
     let plan = plan(&camera(EYE), &[sun()], &technique());
     assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0, 1, 2]);
     assert_eq!(drawn(&bench, &mut shadows, &nothing, Casters::Unmoved), [0; 0]);
+}
+
+/// Of many lights, those that nothing seen is in have no texels and no pass, and those that do not
+/// change are not drawn again.
+#[needs(gpu)]
+#[test]
+fn of_many_lights_only_those_are_drawn_that_are_seen_and_change() {
+    let bench = bench();
+    let lamp = |i: u32| {
+        let at =
+            |k: u32| f64::from((i * 2 + k).wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24);
+        // Half of them behind the camera, where none of what it sees is.
+        let z = if i.is_multiple_of(2) { EYE.z + 12.0 } else { -18.0 * at(1) };
+        DVec3::new(16.0 * at(0) - 8.0, 3.0, z)
+    };
+    let spot = |i: u32| {
+        Light::Spot(SpotLight {
+            position: lamp(i),
+            direction: -DVec3::Y,
+            half_angle_rad: 0.6,
+            near: 0.1,
+            range: 5.0,
+        })
+    };
+    let point = |i: u32| Light::Point(PointLight { position: lamp(i), near: 0.1, range: 5.0 });
+    let mut lights: Vec<Light> = (0..64).map(spot).chain((64..72).map(point)).collect();
+    // Sizes that follow from an error do not depend on the other lights.
+    let technique = Technique { size: Size::MaxError(8.0), ..Technique::default() };
+    for layout in [Layout::Atlas, Layout::Layers] {
+        let mut shadows = shadows(&bench, layout);
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        assert_eq!(plan.maps.len(), 64 + 8 * 6);
+        let seen: Vec<usize> = (0..plan.maps.len()).filter(|&i| !plan.maps[i].is_empty()).collect();
+        let hidden = plan
+            .lights
+            .iter()
+            .filter(|l| plan.maps[l.maps.clone()].iter().all(ShadowMap::is_empty));
+        assert!(hidden.count() >= 36 && seen.len() >= 20, "{} maps", seen.len());
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Moved), seen);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [0; 0]);
+        let changing = plan.lights.iter().position(|l| l.maps.start == seen[0]).unwrap();
+        let Light::Spot(old) = lights[changing] else { panic!("spot lights come first") };
+        let direction = DVec3::new(0.05, -1.0, 0.0);
+        lights[changing] = Light::Spot(SpotLight { direction, ..old });
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        // A map that outgrows its slot can make all maps move.
+        let redrawn = drawn(&bench, &mut shadows, &plan, Casters::Unmoved);
+        assert!(redrawn == [seen[0]] || redrawn == seen, "{redrawn:?}");
+        lights[changing] = Light::Spot(SpotLight { direction: DVec3::new(0.04, -1.0, 0.0), ..old });
+        let plan = self::plan(&camera(EYE), &lights, &technique);
+        assert_eq!(drawn(&bench, &mut shadows, &plan, Casters::Unmoved), [seen[0]], "{layout:?}");
+    }
 }

@@ -9,7 +9,7 @@ mod deferred;
 mod filter_at_run_time;
 #[path = "../../cookbook/filters_per_light.rs"]
 mod filters_per_light;
-mod kitchen;
+pub(crate) mod kitchen;
 #[path = "../../cookbook/resizing.rs"]
 mod resizing;
 #[path = "../../cookbook/show_a_map.rs"]

@@ -5,6 +5,7 @@ mod clamping;
 mod cookbook;
 mod device;
 mod kernels;
+mod partial;
 mod statistics;
 mod trouble;
 

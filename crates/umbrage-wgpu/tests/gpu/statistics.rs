@@ -144,7 +144,7 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
         let mut encoder = bench.encoder();
         let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).unwrap();
         prepared.encode(&mut encoder, &Default::default(), |map| {
-            map.pass.set_pipeline(&own[map.index % 2]);
+            map.pass.set_pipeline(&own[map.redraw.index % 2]);
             map.pass.draw(0..3, 0..1);
         });
         bench.finish(encoder);

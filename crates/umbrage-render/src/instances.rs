@@ -1,0 +1,147 @@
+//! Culling, sorting and uploading of the instances that are drawn.
+
+use crate::scene::{Drawable, SceneBuffers};
+use crate::{Error, Gpu};
+use glam::DVec3;
+use std::ops::Range;
+use umbrage::Aabb;
+use umbrage_wgpu::CasterInstance;
+use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+
+/// Lists of instances to draw, one after the other.
+pub(crate) struct Instances {
+    /// All instances of the scene, in the order of [`SceneBuffers::instances`]. Maps and picture
+    /// copy from here those that they draw.
+    all: Vec<CasterInstance>,
+    /// World position of the origin that `all` is relative to, metres; `None` before the first
+    /// frame.
+    origin: Option<DVec3>,
+    list: Vec<CasterInstance>,
+    draws: Vec<Draw>,
+    /// The instances of a picture: how far away each is, and below that its index.
+    order: Vec<u64>,
+    pub(crate) buffer: Buffer,
+}
+
+/// A draw call: several instances of one mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct Draw {
+    pub(crate) mesh: usize,
+    pub(crate) instances: Range<u32>,
+}
+
+/// A range of draws: those of a map, or those of the picture.
+pub(crate) type DrawList = Range<usize>;
+
+/// The number of low bits by which two squared distances may differ and still count as equal.
+/// Instances of one mesh whose distances lie within about an eighth of an octave share a draw.
+const DISTANCE_BITS: u32 = 23 - 2;
+
+impl Instances {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self {
+            all: Vec::new(),
+            origin: None,
+            list: Vec::new(),
+            draws: Vec::new(),
+            order: Vec::new(),
+            buffer: instance_buffer(gpu, 4096),
+        }
+    }
+
+    /// Begins new lists, whose instances are relative to `origin` (world space, metres).
+    pub(crate) fn begin(&mut self, scene: &SceneBuffers<'_>, origin: DVec3) {
+        self.list.clear();
+        self.draws.clear();
+        if self.origin != Some(origin) {
+            self.all.clear();
+            let at = |i: &Drawable| CasterInstance::new(&i.world_from_mesh, origin);
+            self.all.extend(scene.instances.iter().map(at));
+            self.origin = Some(origin);
+        }
+    }
+
+    /// Adds all instances whose box `is_drawn`, with one draw for those of one mesh.
+    pub(crate) fn add(
+        &mut self,
+        scene: &SceneBuffers<'_>,
+        is_drawn: impl Fn(Aabb) -> bool,
+    ) -> DrawList {
+        let first_draw = self.draws.len();
+        for (i, instance) in scene.instances.iter().enumerate() {
+            if is_drawn(instance.bounds) {
+                self.push(first_draw, instance.mesh, i);
+            }
+        }
+        first_draw..self.draws.len()
+    }
+
+    /// Adds all instances whose box `is_drawn`, the nearest to `eye` (world space, metres) first:
+    /// few fragments are then shaded that others hide. The farthest corner of a box counts, so that
+    /// ground and walls follow what stands before them.
+    pub(crate) fn add_nearest_first(
+        &mut self,
+        scene: &SceneBuffers<'_>,
+        eye: DVec3,
+        is_drawn: impl Fn(Aabb) -> bool,
+    ) -> DrawList {
+        self.order.clear();
+        for (i, instance) in scene.instances.iter().enumerate() {
+            if is_drawn(instance.bounds) {
+                let Aabb { min, max } = instance.bounds;
+                let squared = (min - eye).abs().max((max - eye).abs()).length_squared() as f32;
+                // Positive numbers are ordered as their bits are.
+                let step = u64::from(squared.to_bits() >> DISTANCE_BITS);
+                self.order.push(step << 32 | i as u64);
+            }
+        }
+        self.order.sort_unstable();
+        let first_draw = self.draws.len();
+        for k in 0..self.order.len() {
+            let i = self.order[k] as u32 as usize;
+            self.push(first_draw, scene.instances[i].mesh, i);
+        }
+        first_draw..self.draws.len()
+    }
+
+    /// Adds an instance to the last draw, or to a new one if that draws another mesh or is not of
+    /// the list that begins with `first_draw`.
+    fn push(&mut self, first_draw: usize, mesh: usize, instance: usize) {
+        let index = self.list.len() as u32;
+        self.list.push(self.all[instance]);
+        match self.draws[first_draw..].last_mut() {
+            Some(draw) if draw.mesh == mesh => draw.instances.end = index + 1,
+            _ => self.draws.push(Draw { mesh, instances: index..index + 1 }),
+        }
+    }
+
+    /// The draws of a list.
+    pub(crate) fn draws(&self, list: DrawList) -> &[Draw] {
+        &self.draws[list]
+    }
+
+    pub(crate) fn upload(&mut self, gpu: &Gpu) -> Result<(), Error> {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.list);
+        if self.buffer.size() < bytes.len() as u64 {
+            let max = gpu.device().limits().max_buffer_size;
+            if bytes.len() as u64 > max {
+                return Err(Error::TooLarge {
+                    what: format!("the list of {} instances to draw", self.list.len()),
+                    problem: format!("a buffer holds at most {max} bytes"),
+                });
+            }
+            self.buffer = instance_buffer(gpu, (bytes.len() as u64).next_power_of_two().min(max));
+        }
+        gpu.queue().write_buffer(&self.buffer, 0, bytes);
+        Ok(())
+    }
+}
+
+fn instance_buffer(gpu: &Gpu, size: u64) -> Buffer {
+    gpu.device().create_buffer(&BufferDescriptor {
+        label: Some("instances"),
+        size,
+        usage: BufferUsages::VERTEX | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
