@@ -2,9 +2,9 @@
 //! names.
 
 use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
-use crate::{Bias, Error, Support};
+use crate::{Bias, Error, LookupBuffers};
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, DVec4, Mat4, Vec4};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4};
 use umbrage::visibility::Filter;
 use umbrage::{Place, Plan, ShadowMap, Slab};
 
@@ -12,12 +12,9 @@ use umbrage::{Place, Plan, ShadowMap, Slab};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Settings {
-    pub(crate) bias_texels: f32,
-    pub(crate) bias_metres: f32,
     pub(crate) light_count: u32,
     pub(crate) padding: u32,
     pub(crate) texture_scale: [f32; 2],
-    pub(crate) padding_too: [f32; 2],
     pub(crate) pixel_gradient: Vec4,
     pub(crate) eye: Vec4,
 }
@@ -28,8 +25,14 @@ pub(crate) struct Settings {
 pub(crate) struct Light {
     pub(crate) first_map: u32,
     pub(crate) map_count: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) is_sliced: u32,
+    pub(crate) padding: u32,
+    pub(crate) axis: Vec4,
+    pub(crate) ends: [f32; MAX_SLICES],
 }
+
+/// The most slices that lookup finds by their distance along the view.
+const MAX_SLICES: usize = 16;
 
 /// `ShadowMap`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -39,15 +42,24 @@ pub(crate) struct Map {
     pub(crate) t: Vec4,
     pub(crate) depth: Vec4,
     pub(crate) w: Vec4,
+    pub(crate) along_s: Vec4,
+    pub(crate) along_t: Vec4,
+    pub(crate) along_depth: Vec4,
+    pub(crate) footprint_x: Vec4,
+    pub(crate) footprint_y: Vec4,
+    pub(crate) footprint_s: f32,
+    pub(crate) margin: f32,
+    pub(crate) kind: u32,
+    pub(crate) layer: u32,
+    pub(crate) size: [f32; 2],
+    pub(crate) origin: [f32; 2],
     pub(crate) fade_from: Vec4,
     pub(crate) beam_scale: Vec4,
     pub(crate) slab: Vec4,
-    pub(crate) size: [f32; 2],
-    pub(crate) origin: [f32; 2],
-    pub(crate) layer: u32,
     pub(crate) first_plane: u32,
     pub(crate) plane_count: u32,
     pub(crate) index: u32,
+    pub(crate) padding: u32,
 }
 
 /// `ShadowCasterMap`.
@@ -95,19 +107,18 @@ impl Lookup {
             for index in light.maps.clone() {
                 if let Some(place) = placed.places[index] {
                     let map = &plan.maps[index];
-                    maps.push(Map::new(map, index, &place, planes, placed.render_origin));
+                    maps.push(Map::new(map, index, &place, planes, placed));
                 }
             }
+            let lit = light.maps.clone().filter(|&i| placed.places[i].is_some());
+            let slices = Slices::of(lit.map(|i| &plan.maps[i]));
             let map_count = maps.len() as u32 - first_map;
-            lights.push(Light { first_map, map_count, padding: [0; 2] });
+            lights.push(Light::new(first_map, map_count, slices, placed.render_origin));
         }
         *settings = Settings {
-            bias_texels: placed.bias.texels,
-            bias_metres: placed.bias.metres,
             light_count: lights.len() as u32,
             padding: 0,
             texture_scale: placed.texture_size.map(|n| 1.0 / n.max(1) as f32),
-            padding_too: [0.0; 2],
             pixel_gradient: {
                 let local_from_render = placed.render_origin - plan.origin;
                 let gradient = plan.pixel_gradient;
@@ -117,15 +128,15 @@ impl Lookup {
         };
     }
 
-    /// Checks that a device without storage buffers has room for as many lights, maps and planes.
-    pub(crate) fn check(&self, support: &Support) -> Result<(), Error> {
+    /// Checks that buffers of this kind have room for as many lights, maps and planes.
+    pub(crate) fn check(&self, buffers: LookupBuffers) -> Result<(), Error> {
         let counts = [
             ("lights", self.lights.len(), MAX_LIGHTS),
             ("maps", self.maps.len(), MAX_MAPS),
             ("planes around what maps serve", self.planes.len(), MAX_PLANES),
         ];
         match counts.into_iter().find(|&(_, given, max)| given > max) {
-            Some((what, given, max)) if !support.storage_buffers => {
+            Some((what, given, max)) if buffers == LookupBuffers::Uniform => {
                 Err(Error::TooMany { what, given, max })
             }
             _ => Ok(()),
@@ -133,38 +144,150 @@ impl Lookup {
     }
 }
 
+/// Slices that follow one another along the view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Slices {
+    /// World position from which distances count, metres.
+    origin: DVec3,
+    /// Unit vector.
+    axis: DVec3,
+    /// The distances at which the slices end, ascending, metres.
+    ends: [f64; MAX_SLICES],
+}
+
+impl Slices {
+    /// The slices whose maps these are; `None` if there are too many, if one does not begin where
+    /// the one before it ends, or if other planes bound what one of them serves.
+    fn of<'a>(maps: impl Iterator<Item = &'a ShadowMap>) -> Option<Self> {
+        let mut slices: Option<Self> = None;
+        let mut last_end = f64::NEG_INFINITY;
+        for (i, map) in maps.enumerate() {
+            let slices = slices.get_or_insert(Self {
+                origin: map.origin,
+                axis: -map.cell.last()?.normal,
+                ends: [f64::from(f32::MAX); MAX_SLICES],
+            });
+            let (mut begin, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
+            for plane in &map.cell {
+                if plane.normal == slices.axis {
+                    begin = begin.max(-plane.offset);
+                } else if plane.normal == -slices.axis {
+                    end = end.min(plane.offset);
+                } else {
+                    return None;
+                }
+            }
+            if map.fade_from.is_some() || begin != last_end || map.origin != slices.origin {
+                return None;
+            }
+            *slices.ends.get_mut(i)? = end;
+            last_end = end;
+        }
+        slices
+    }
+}
+
+impl Light {
+    fn new(first_map: u32, map_count: u32, slices: Option<Slices>, render_origin: DVec3) -> Self {
+        let counted = Self { first_map, map_count, ..Self::default() };
+        slices.map_or(counted, |Slices { origin, axis, ends }| Self {
+            is_sliced: 1,
+            axis: axis.extend(axis.dot(render_origin - origin)).as_vec4(),
+            ends: ends.map(|end| end as f32),
+            ..counted
+        })
+    }
+}
+
+/// The kinds of maps, as in `wgsl/receiver.wesl`.
+const AFFINE: u32 = 0;
+const ONE_POINT: u32 = 1;
+const GENERAL: u32 = 2;
+
 impl Map {
     fn new(
         map: &ShadowMap,
         index: usize,
         place: &Place,
         planes: &mut Vec<Vec4>,
-        render_origin: DVec3,
+        placed: &Placed<'_>,
     ) -> Self {
-        let local_from_render = local_from_render(map, render_origin);
+        let local_from_render = local_from_render(map, placed.render_origin);
         let m = map.shadow_from_local * local_from_render;
-        let size = place.size.map(f64::from);
+        let [width, height] = place.size.map(f64::from);
         let plane = |p: umbrage::Plane| {
             p.normal.extend(p.offset + p.normal.dot(local_from_render.w_axis.truncate())).as_vec4()
         };
         let first_plane = planes.len() as u32;
         planes.extend(map.cell.iter().map(|&p| plane(p)));
-        Self {
-            s: (m.row(0) * size[0]).as_vec4(),
-            t: (m.row(1) * size[1]).as_vec4(),
+        let render_from_local = DMat4::from_translation(map.origin - placed.render_origin);
+        let inverse = render_from_local * map.local_from_shadow;
+        let [s, t, depth] = [inverse.x_axis / width, inverse.y_axis / height, inverse.z_axis];
+        let with_plane = Self {
+            s: (m.row(0) * width).as_vec4(),
+            t: (m.row(1) * height).as_vec4(),
             depth: m.row(2).as_vec4(),
             w: m.row(3).as_vec4(),
+            along_s: s.as_vec4(),
+            along_t: t.as_vec4(),
+            along_depth: depth.as_vec4(),
+            layer: place.layer,
+            size: place.size.map(|n| n as f32),
+            origin: place.origin.map(|n| n as f32),
             // The plane at infinity has no point on its negative side, so the map never fades.
             fade_from: map.fade_from.map_or(Vec4::W, plane),
             beam_scale: beam_scale(map),
             slab: slab(map),
-            size: place.size.map(|n| n as f32),
-            origin: place.origin.map(|n| n as f32),
-            layer: place.layer,
             first_plane,
             plane_count: map.cell.len() as u32,
             index: index as u32,
+            ..Self::default()
+        };
+        with_plane.with_bias([s, t, depth], m.row(3), placed.bias)
+    }
+
+    /// Adds what `shadow_slack` needs: `along` are the columns of the inverse matrix, and `w` is
+    /// the matrix's last row.
+    fn with_bias(self, along: [DVec4; 3], w: DVec4, bias: Bias) -> Self {
+        let [s, t, depth] = along;
+        // Without a margin of the user's, the slack is half a diameter.
+        let share = 0.5 + f64::from(bias.texels);
+        let metres = f64::from(bias.metres);
+        let is_one_point = s.w == 0.0 && depth.w == 0.0;
+        if !is_one_point {
+            return Self {
+                footprint_s: share as f32,
+                margin: metres as f32,
+                kind: GENERAL,
+                ..self
+            };
         }
+        // The steps in units of the step in depth, in an orthonormal basis across the beam whose x
+        // axis lies along the step in s.
+        let length = depth.truncate().length();
+        let beam = depth.truncate() / length;
+        let across = s.truncate().reject_from_normalized(beam);
+        let x = across.normalize();
+        let y = beam.cross(x);
+        let scale = share / length;
+        let row = |axis: DVec3| (axis * -t.w).extend(axis.dot(t.truncate())) * scale;
+        let footprint_s = across.length() * scale;
+        let margin = (metres / length) as f32;
+        if w != DVec4::W {
+            return Self {
+                footprint_x: row(x).as_vec4(),
+                footprint_y: row(y).as_vec4(),
+                footprint_s: footprint_s as f32,
+                margin,
+                kind: ONE_POINT,
+                ..self
+            };
+        }
+        // The step in t is the same everywhere.
+        let step = DVec2::new(row(x).w, row(y).w);
+        let [ss, tt, st] = [footprint_s * footprint_s, step.length_squared(), footprint_s * step.x];
+        let longest = (0.5 * (ss + tt) + (0.5 * (ss - tt)).hypot(st)).sqrt();
+        Self { footprint_s: longest as f32, margin, kind: AFFINE, ..self }
     }
 }
 

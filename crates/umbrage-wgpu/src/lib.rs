@@ -60,7 +60,9 @@ mod wgsl;
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
-pub use shadows::{Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, ShadowOptions, Shadows};
+pub use shadows::{
+    Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, LookupBuffers, ShadowOptions, Shadows,
+};
 pub use support::Support;
 
 // Their types are in this API: whoever names them by these paths has the versions that fit.

@@ -31,6 +31,34 @@ pub struct ShadowOptions {
     pub comparison: Comparison,
     /// Whether maps share one layer of the depth texture or have a layer each.
     pub layout: Layout,
+    /// The kind of the buffers from which lookups read what they need to know of the maps.
+    /// [`Shadows::options`] gives the choice that the device allowed.
+    pub buffers: LookupBuffers,
+}
+
+/// The kind of the buffers from which lookups read lights, maps and planes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LookupBuffers {
+    /// Uniform buffers, which many devices read faster than storage buffers. They hold at most 16
+    /// lights, 64 maps and 512 planes around what maps serve; [`Shadows::prepare`] returns
+    /// [`Error::TooMany`] for larger plans.
+    #[default]
+    Uniform,
+    /// Storage buffers, which hold any number. Devices that have none take uniform buffers in their
+    /// place.
+    Storage,
+}
+
+impl LookupBuffers {
+    /// Uniform buffers if they hold a plan's lights, maps and planes, otherwise storage buffers.
+    pub fn for_plan(plan: &Plan) -> Self {
+        let maps = || plan.maps.iter().filter(|map| !map.is_empty());
+        let planes: usize = maps().map(|map| map.cell.len()).sum();
+        let fits = plan.lights.len() <= wgsl::MAX_LIGHTS
+            && maps().count() <= wgsl::MAX_MAPS
+            && planes <= wgsl::MAX_PLANES;
+        if fits { Self::Uniform } else { Self::Storage }
+    }
 }
 
 /// What compares a receiver's depth with the depths of the texels around it.
@@ -189,7 +217,9 @@ impl Shadows {
             _ if !support.depth_fetch => Comparison::Hardware,
             comparison => comparison,
         };
-        let options = ShadowOptions { comparison, ..*options };
+        let buffers =
+            if support.storage_buffers { options.buffers } else { LookupBuffers::Uniform };
+        let options = ShadowOptions { comparison, buffers, ..*options };
         let filter_mode = match options.filter {
             Filter::Prefiltered(_) => FilterMode::Linear,
             Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
@@ -206,7 +236,7 @@ impl Shadows {
             ..SamplerDescriptor::default()
         });
         let lookup_layout = lookup_layout(device, &support, &options);
-        let buffers = Buffers::new(device, &support);
+        let buffers = Buffers::new(device, options.buffers);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
         let prefiltering = match options.filter.prefilter() {
             Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
@@ -303,7 +333,7 @@ impl Shadows {
     /// The text cannot be a package that is known at build time, because its bindings depend on the
     /// device ([`Support`]) and its constants on the filter.
     pub fn lookup_wgsl(&self, group: u32) -> String {
-        wgsl::lookup(group, &self.options, self.support.storage_buffers)
+        wgsl::lookup(group, &self.options)
     }
 
     /// The text of [`lookup_wgsl`](Self::lookup_wgsl) for shaders that look several [`Shadows`] up,
@@ -458,8 +488,8 @@ impl Shadows {
     /// - [`Error::LogarithmicRows`] if a GPU cannot draw a map.
     /// - [`Error::NoRoom`], or [`Error::Invalid`] with [`Layout::Layers`], if the maps do not fit
     ///   into the device's textures.
-    /// - [`Error::TooMany`] if a device without storage buffers cannot take as many lights, maps or
-    ///   planes.
+    /// - [`Error::TooMany`] if there are more lights, maps or planes than uniform buffers hold, and
+    ///   lookups read these (see [`LookupBuffers`]).
     /// - [`Error::Invalid`] if `frame.render_origin` is not finite.
     ///
     /// After an error, the maps that are drawn and the data that shaders read are as before.
@@ -497,7 +527,7 @@ impl Shadows {
                 bias: self.bias,
             },
         );
-        self.lookup.check(&self.support)?;
+        self.lookup.check(self.options.buffers)?;
         let mut rebind = false;
         if !self.texture.holds(size, layers) {
             self.texture =
@@ -507,7 +537,7 @@ impl Shadows {
             }
             rebind = true;
         }
-        rebind |= self.buffers.hold(device, &self.support, &self.lookup);
+        rebind |= self.buffers.hold(device, self.options.buffers, &self.lookup);
         if rebind {
             let view = looked_up(&self.texture, self.prefiltering.as_ref());
             self.lookup_bind_group =
@@ -577,10 +607,9 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
     } else {
         ShaderStages::FRAGMENT
     };
-    let array = if support.storage_buffers {
-        BufferBindingType::Storage { read_only: true }
-    } else {
-        BufferBindingType::Uniform
+    let array = match options.buffers {
+        LookupBuffers::Uniform => BufferBindingType::Uniform,
+        LookupBuffers::Storage => BufferBindingType::Storage { read_only: true },
     };
     let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let types = [

@@ -320,7 +320,7 @@ struct Out { texel: vec2f, slope: vec2f, depth: f32, slack: f32, weight: f32, pa
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if (id.x < arrayLength(&points)) {
         let p = points[id.x];
-        let r = shadow_receiver(shadow_point(p.map, p.position), p.normal);
+        let r = shadow_receiver(p.map, p.position, p.normal);
         out[id.x] = Out(r.texel, r.slope, r.depth, r.slack, shadow_weight(p.map, p.position), 0.0);
     }
 }";
