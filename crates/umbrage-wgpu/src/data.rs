@@ -12,9 +12,9 @@ use umbrage::{Place, Plan, ShadowMap, Slab};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Settings {
+    pub(crate) texture_scale: [f32; 2],
     pub(crate) light_count: u32,
     pub(crate) padding: u32,
-    pub(crate) texture_scale: [f32; 2],
     pub(crate) pixel_gradient: Vec4,
     pub(crate) eye: Vec4,
 }
@@ -25,7 +25,7 @@ pub(crate) struct Settings {
 pub(crate) struct Light {
     pub(crate) first_map: u32,
     pub(crate) map_count: u32,
-    pub(crate) is_sliced: u32,
+    pub(crate) choice: u32,
     pub(crate) padding: u32,
     pub(crate) axis: Vec4,
     pub(crate) ends: [f32; MAX_SLICES],
@@ -48,7 +48,7 @@ pub(crate) struct Map {
     pub(crate) footprint_x: Vec4,
     pub(crate) footprint_y: Vec4,
     pub(crate) footprint_s: f32,
-    pub(crate) margin: f32,
+    pub(crate) rounding: f32,
     pub(crate) kind: u32,
     pub(crate) layer: u32,
     pub(crate) size: [f32; 2],
@@ -59,7 +59,7 @@ pub(crate) struct Map {
     pub(crate) first_plane: u32,
     pub(crate) plane_count: u32,
     pub(crate) index: u32,
-    pub(crate) padding: u32,
+    pub(crate) margin: f32,
 }
 
 /// `ShadowCasterMap`.
@@ -187,11 +187,15 @@ impl Slices {
     }
 }
 
+/// How the maps that serve a point are found, as in `wgsl/choice.wesl`. The default is by planes.
+const BY_DISTANCE: u32 = 1;
+const ONE: u32 = 2;
+
 impl Light {
     fn new(first_map: u32, map_count: u32, slices: Option<Slices>, render_origin: DVec3) -> Self {
         let counted = Self { first_map, map_count, ..Self::default() };
         slices.map_or(counted, |Slices { origin, axis, ends }| Self {
-            is_sliced: 1,
+            choice: if map_count == 1 { ONE } else { BY_DISTANCE },
             axis: axis.extend(axis.dot(render_origin - origin)).as_vec4(),
             ends: ends.map(|end| end as f32),
             ..counted
@@ -203,6 +207,9 @@ impl Light {
 const AFFINE: u32 = 0;
 const ONE_POINT: u32 = 1;
 const GENERAL: u32 = 2;
+
+/// `SHADOW_ROUNDING` of that file.
+const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
 impl Map {
     fn new(
@@ -232,8 +239,13 @@ impl Map {
             along_t: t.as_vec4(),
             along_depth: depth.as_vec4(),
             layer: place.layer,
-            size: place.size.map(|n| n as f32),
-            origin: place.origin.map(|n| n as f32),
+            size: place.size.map(|n| (n as f32).next_down()),
+            origin: [0, 1].map(|i| {
+                (f64::from(place.origin[i]) / f64::from(placed.texture_size[i].max(1))) as f32
+            }),
+            // Points that the map serves lie inside the map up to rounding, even at the border of
+            // its part of the view.
+            rounding: (1e-4 * width.max(height)) as f32,
             // The plane at infinity has no point on its negative side, so the map never fades.
             fade_from: map.fade_from.map_or(Vec4::W, plane),
             beam_scale: beam_scale(map),
@@ -287,7 +299,8 @@ impl Map {
         let step = DVec2::new(row(x).w, row(y).w);
         let [ss, tt, st] = [footprint_s * footprint_s, step.length_squared(), footprint_s * step.x];
         let longest = (0.5 * (ss + tt) + (0.5 * (ss - tt)).hypot(st)).sqrt();
-        Self { footprint_s: longest as f32, margin, kind: AFFINE, ..self }
+        let slack = longest + metres / length + ROUNDING;
+        Self { footprint_s: slack as f32, kind: AFFINE, ..self }
     }
 }
 

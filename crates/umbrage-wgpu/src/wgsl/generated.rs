@@ -154,7 +154,7 @@ pub(super) fn pcf(n: u32, layout: Layout) -> Module {
                 _ => format!(" + {:?} * {slope}", f64::from(k)),
             });
             fours += &format!(
-                "    lit = shadow_lit(receiver, depths, expected{});\n",
+                "    lit = shadow_lit(limits, depths, rises{});\n",
                 match (across.is_empty(), along.is_empty()) {
                     (true, true) => String::new(),
                     _ => format!(
@@ -187,7 +187,7 @@ pub(super) fn pcf(n: u32, layout: Layout) -> Module {
     let text = format!(
         "\
 import package::buffers::storage::{{shadow_maps, shadow_settings}};
-import package::receiver::{{ShadowReceiver, shadow_expected, shadow_lit}};
+import package::receiver::{{ShadowReceiver, shadow_limits, shadow_lit}};
 import package::texture::atlas::{{shadow_depths, shadow_sampler}};
 
 // Percentage-closer filtering (Reeves, Salesin and Cook 1987): the share of lit texels in a box of
@@ -201,11 +201,12 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {{
     let fraction = start - first;
     // The corner at which four texels meet.
     let corner = first + {corner:?};
-    let at = (corner + shadow_maps[map].origin) * shadow_settings.texture_scale;
+    let at = corner * shadow_settings.texture_scale + shadow_maps[map].origin;
     let slope = receiver.slope;
     let rise = 0.5 * (slope.x + slope.y);
     let fall = 0.5 * (slope.x - slope.y);
-    let expected = shadow_expected(receiver, corner) + vec4f(-fall, rise, fall, -rise);
+    let rises = vec4f(-fall, rise, fall, -rise);
+    let limits = shadow_limits(receiver, corner);
     var sum = 0.0;
     var depths: vec4f;
     var lit: vec4f;

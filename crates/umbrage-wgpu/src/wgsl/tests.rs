@@ -151,9 +151,9 @@ fn structs_are_laid_out_alike() {
         m,
         "ShadowSettings",
         data::Settings,
-        [light_count, texture_scale, pixel_gradient, eye]
+        [texture_scale, light_count, pixel_gradient, eye]
     );
-    check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, is_sliced, axis, ends]);
+    check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, choice, axis, ends]);
     check_layout!(
         m,
         "ShadowMap",
@@ -169,7 +169,7 @@ fn structs_are_laid_out_alike() {
             footprint_x,
             footprint_y,
             footprint_s,
-            margin,
+            rounding,
             kind,
             layer,
             size,
@@ -179,7 +179,8 @@ fn structs_are_laid_out_alike() {
             slab,
             first_plane,
             plane_count,
-            index
+            index,
+            margin
         ]
     );
     let (module, _) = validated(&mesh(&Support::FULL, true));
