@@ -196,25 +196,28 @@ import package::texture::atlas::{{shadow_depths, shadow_sampler}};
 //
 // Written by `generated.rs`.
 fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {{
-    let start = receiver.texel - {half:?};
-    let first = floor(start);
-    let fraction = start - first;
-    // The corner at which four texels meet.
-    let corner = first + {corner:?};
+    let place = receiver.texel{shift};
+    // The corner at which four texels meet, in the middle of the box.
+    let corner = floor(place);
+    let fraction = place - corner;
     let at = corner * shadow_settings.texture_scale + shadow_maps[map].origin;
     let slope = receiver.slope;
     let rise = 0.5 * (slope.x + slope.y);
     let fall = 0.5 * (slope.x - slope.y);
     let rises = vec4f(-fall, rise, fall, -rise);
-    let limits = shadow_limits(receiver, corner);
+    let limits = shadow_limits(receiver, corner, {reach:?});
     var sum = 0.0;
     var depths: vec4f;
     var lit: vec4f;
 {fours}    return sum * {share:?};
 }}
 ",
-        half = 0.5 * f64::from(n),
-        corner = f64::from(middle + 1),
+        shift = match f64::from(middle + 1) - 0.5 * f64::from(n) {
+            0.0 => String::new(),
+            shift if shift < 0.0 => format!(" - {:?}", -shift),
+            shift => format!(" + {shift:?}"),
+        },
+        reach = 0.5 * f64::from(n + 1),
         share = 1.0 / f64::from(n * n),
     );
     Module { path: "filter/pcf", text: text.into() }
