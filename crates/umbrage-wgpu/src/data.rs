@@ -376,3 +376,114 @@ pub(crate) fn clip_from_render(map: &ShadowMap, filter: &Filter, render_origin: 
     let [x, y] = [across(0), -across(1)];
     DMat4::from_cols(x, y, m.row(2), w).transpose()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use umbrage::{Bounds, Camera, LookAt, Planner, PointLight, SpotLight};
+
+    /// The data for one light and a technique, in render space around the origin of the world.
+    fn filled(light: umbrage::Light, technique: &str) -> (Lookup, Plan) {
+        let camera = Camera::look_at(LookAt {
+            eye: DVec3::new(3.0, 2.0, 1.0),
+            target: DVec3::new(9.0, 1.0, -4.0),
+            up: DVec3::Y,
+            fov_y_rad: 1.0,
+            image: [640, 360],
+            near: 0.1,
+            far: 80.0,
+        });
+        let scene =
+            umbrage::Aabb { min: DVec3::new(-50.0, 0.0, -50.0), max: DVec3::new(50.0, 9.0, 50.0) };
+        let technique = technique.parse().unwrap();
+        let plan = Planner::new()
+            .plan(&camera.unwrap(), &[light], &Bounds::of_scene(scene), &technique)
+            .unwrap()
+            .clone();
+        let place = |map: &ShadowMap| {
+            (!map.is_empty()).then_some(Place { layer: 0, origin: [8, 24], size: map.resolution })
+        };
+        let places: Vec<_> = plan.maps.iter().map(place).collect();
+        let placed = Placed {
+            places: &places,
+            texture_size: [4096, 1024],
+            render_origin: DVec3::ZERO,
+            bias: Bias::default(),
+        };
+        let mut lookup = Lookup::default();
+        lookup.fill(&plan, &placed);
+        (lookup, plan)
+    }
+
+    fn sun() -> umbrage::Light {
+        umbrage::Light::Directional { direction: DVec3::new(0.5, -1.0, 0.25) }
+    }
+
+    fn spot() -> umbrage::Light {
+        umbrage::Light::Spot(SpotLight {
+            position: DVec3::new(8.0, 7.0, -2.0),
+            direction: -DVec3::Y,
+            half_angle_rad: 0.9,
+            near: 0.1,
+            range: 30.0,
+        })
+    }
+
+    fn bulb() -> umbrage::Light {
+        let position = DVec3::new(8.0, 5.0, -2.0);
+        umbrage::Light::Point(PointLight { position, near: 0.1, range: 30.0 })
+    }
+
+    /// The quick ways to find a map are taken exactly where nothing else bounds what it serves.
+    #[test]
+    fn maps_are_found_in_the_quickest_way() {
+        for (light, technique, choice) in [
+            (sun(), "adaptive", ONE),
+            (sun(), "unfocused", ONE),
+            (sun(), "adaptive+z4", BY_DISTANCE),
+            (sun(), "uniform(stable)+z16", BY_DISTANCE),
+            (sun(), "adaptive+z3(fitted,overlap=0.2)", 0),
+            (sun(), "lispsm+face", 0),
+            (spot(), "adaptive+z2", 0),
+            (bulb(), "adaptive", 0),
+        ] {
+            let (lookup, _) = filled(light, technique);
+            assert_eq!(lookup.lights[0].choice, choice, "{technique}");
+        }
+    }
+
+    #[test]
+    fn every_map_is_of_the_simplest_kind() {
+        for (light, technique, kind) in [
+            (sun(), "uniform", AFFINE),
+            (sun(), "uniform(stable)+z2", AFFINE),
+            (sun(), "lispsm", ONE_POINT),
+            (sun(), "adaptive+face", ONE_POINT),
+            (sun(), "psm", GENERAL),
+            (spot(), "uniform", GENERAL),
+        ] {
+            let (lookup, _) = filled(light, technique);
+            let most_general = lookup.maps.iter().map(|map| map.kind).max();
+            assert_eq!(most_general, Some(kind), "{technique}");
+        }
+    }
+
+    /// The slice that the distance alone finds is the one whose planes hold the point.
+    #[test]
+    fn slices_by_distance_are_those_by_planes() {
+        let (lookup, plan) = filled(sun(), "adaptive+z6");
+        let light = lookup.lights[0];
+        let mut found = [0; 6];
+        for k in 0..1000 {
+            let point = DVec3::new(3.0, 2.0, 1.0)
+                + DVec3::new(6.0, -1.0, -5.0) * (0.02 + 0.02 * f64::from(k));
+            let distance = light.axis.dot(point.extend(1.0).as_vec4());
+            let slice = light.ends.iter().filter(|&&end| distance > end).count();
+            let map = (slice < light.map_count as usize)
+                .then(|| lookup.maps[light.first_map as usize + slice].index as usize);
+            assert_eq!(map, plan.lookup(0, point).next().map(|(map, _)| map), "{point}");
+            map.into_iter().for_each(|_| found[slice] += 1);
+        }
+        assert!(found.iter().all(|&n| n > 0), "{found:?}");
+    }
+}

@@ -9,7 +9,7 @@ use glam::{DMat4, DVec3};
 pub(crate) use resources::DepthTexture;
 use resources::{Buffers, CasterBuffer, view_dimension};
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
+use umbrage::{Aabb, Faces, Place, Plan, Plane, Rows, ShadowMap, Slab, Technique};
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType,
     BufferBindingType, CompareFunction, DepthStencilState, Device, Extent3d, FilterMode,
@@ -41,7 +41,8 @@ pub struct ShadowOptions {
 pub enum LookupBuffers {
     /// Uniform buffers, which many devices read faster than storage buffers. They hold at most 16
     /// lights, 64 maps and 512 planes around what maps serve; [`Shadows::prepare`] returns
-    /// [`Error::TooMany`] for larger plans.
+    /// [`Error::TooMany`] for larger plans. That is room for one light of almost any technique;
+    /// [`for_technique`](Self::for_technique) tells.
     #[default]
     Uniform,
     /// Storage buffers, which hold any number. Devices that have none take uniform buffers in their
@@ -50,13 +51,22 @@ pub enum LookupBuffers {
 }
 
 impl LookupBuffers {
-    /// Uniform buffers if they hold a plan's lights, maps and planes, otherwise storage buffers.
-    pub fn for_plan(plan: &Plan) -> Self {
-        let maps = || plan.maps.iter().filter(|map| !map.is_empty());
-        let planes: usize = maps().map(|map| map.cell.len()).sum();
-        let fits = plan.lights.len() <= wgsl::MAX_LIGHTS
-            && maps().count() <= wgsl::MAX_MAPS
-            && planes <= wgsl::MAX_PLANES;
+    /// Uniform buffers if they hold the maps that a technique makes for this many lights, even if
+    /// all of them are point lights; otherwise storage buffers.
+    pub fn for_technique(technique: &Technique, lights: usize) -> Self {
+        const CUBE_SIDES: usize = 6;
+        let [faces, face_planes] = match technique.partition.faces {
+            Faces::Whole => [1, 0],
+            Faces::Sides => [4, 3],
+            Faces::SidesAndNear => [5, 4],
+        };
+        // A pyramid of light has up to six planes. A slice has two ends, and the view has one.
+        let planes = 6 + 2 + 1 + face_planes;
+        let of_light = CUBE_SIDES * faces * technique.partition.slices as usize;
+        let maps = lights.saturating_mul(of_light);
+        let fits = lights <= wgsl::MAX_LIGHTS
+            && maps <= wgsl::MAX_MAPS
+            && maps.saturating_mul(planes) <= wgsl::MAX_PLANES;
         if fits { Self::Uniform } else { Self::Storage }
     }
 }

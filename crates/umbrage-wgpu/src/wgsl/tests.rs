@@ -99,6 +99,40 @@ fn every_lookup_module_is_valid_in_front_of_a_users_shader() {
     }
 }
 
+/// naga adds a counter to every loop to bound it, which keeps compilers from unrolling. The loops
+/// left are those that find the maps of faces, overlaps and lamps, and the samples of a blur over a
+/// width, whose number depends on the surface.
+#[test]
+fn no_filter_has_a_loop() {
+    const WITH_LOOPS: [&str; 2] = ["choice", "footprint/width"];
+    let mut filters = Vec::new();
+    for word in umbrage::language::FILTERS {
+        filters.push(word.example.to_owned());
+        filters.extend(word.options.iter().map(|o| format!("{}({})", word.example, o.example)));
+    }
+    assert!(filters.len() > 20, "{filters:?}");
+    for filter in filters {
+        let technique = format!("uniform:{filter}").parse::<umbrage::Technique>();
+        let filter = technique.unwrap_or_else(|e| panic!("{filter}: {e}")).filter;
+        let mut shaders = Vec::new();
+        for comparison in [Comparison::PerTexel, Comparison::Hardware] {
+            let options = ShadowOptions { filter, comparison, ..ShadowOptions::default() };
+            shaders.push(lookup_shader(0, &options));
+        }
+        if let Some(prefilter) = filter.prefilter() {
+            let all = textures(&prefilter.statistic);
+            shaders.extend(PASSES.map(|pass| prefilter_shader(prefilter, pass, 0..all)));
+        }
+        let modules = shaders.iter().flat_map(|shader| shader.modules());
+        for (path, text) in modules.filter(|(path, _)| !WITH_LOOPS.contains(path)) {
+            let code = text.lines().map(|line| line.split("//").next().unwrap_or_default());
+            let mut words = code.flat_map(|line| line.split(|c: char| !c.is_alphanumeric()));
+            let is_loop = |word: &str| ["for", "loop", "while"].contains(&word);
+            assert!(!words.any(is_loop), "{filter}: {path}");
+        }
+    }
+}
+
 #[test]
 fn every_caster_module_is_valid() {
     for depth_clip_control in [true, false] {
