@@ -17,14 +17,17 @@ fn main() -> Result<()> {
     let compiler = radv::Compiler::open()?;
     eprintln!("{}", compiler.device());
     let without = compiler.instructions(&text::without_lookup()?)?;
-    println!("{:28} {:>8} {:>14} {:>8}", "filter", "all", "straight path", "lookup");
-    println!("{:28} {without:>8} {without:>14} {:>8}", "none", 0);
+    println!("{:28} {:>8} {:>8} {:>8} {:>8}", "filter", "all", "one map", "slices", "lookup");
+    println!("{:28} {without:>8} {without:>8} {without:>8} {:>8}", "none", 0);
     for filter in filters {
-        let count = |paths| -> Result<u64> { compiler.instructions(&text::frame(&filter, paths)?) };
-        let count = |paths| count(paths).with_context(|| format!("filter {filter}"));
-        let [all, straight] = [count(Paths::All)?, count(Paths::Straight)?];
-        let lookup = straight.saturating_sub(without);
-        println!("{filter:28} {all:>8} {straight:>14} {lookup:>8}");
+        let count = |paths| -> Result<u64> {
+            let text = text::frame(&filter, paths)?;
+            compiler.instructions(&text).with_context(|| format!("filter {filter}"))
+        };
+        let [all, one] = [count(Paths::All)?, count(Paths::Straight)?];
+        let slices = count(Paths::Slices)?;
+        let lookup = one.saturating_sub(without);
+        println!("{filter:28} {all:>8} {one:>8} {slices:>8} {lookup:>8}");
     }
     Ok(())
 }

@@ -14,22 +14,29 @@ pub(crate) enum Paths {
     All,
     /// That of a light with one map whose matrix is affine.
     Straight,
+    /// That of a light with slices whose matrices are affine.
+    Slices,
 }
 
-/// What the lookup reads of a light and its map, and the values on the straight path.
-const ASSUMED: [(&str, &str); 2] = [
-    ("shadow_lights[light].choice", "SHADOW_ONE"),
-    ("shadow_maps[map].kind", "SHADOW_AFFINE"),
-];
+impl Paths {
+    /// What the lookup reads of a light and its map, and the values on the path.
+    fn assumed(self) -> &'static [(&'static str, &'static str)] {
+        const KIND: (&str, &str) = ("shadow_maps[map].kind", "SHADOW_AFFINE");
+        const CHOICE: &str = "shadow_lights[light].choice";
+        match self {
+            Self::All => &[],
+            Self::Straight => &[(CHOICE, "SHADOW_ONE"), KIND],
+            Self::Slices => &[(CHOICE, "SHADOW_BY_DISTANCE"), KIND],
+        }
+    }
+}
 
 /// The frame's shader with the lookup of a filter, which is given in the language of techniques.
 pub(crate) fn frame(filter: &str, paths: Paths) -> Result<String> {
     let mut text = lookup(filter)?;
-    if paths == Paths::Straight {
-        for (read, value) in ASSUMED {
-            ensure!(text.contains(read), "the lookup no longer reads {read}");
-            text = text.replace(read, value);
-        }
+    for (read, value) in paths.assumed() {
+        ensure!(text.contains(read), "the lookup no longer reads {read}");
+        text = text.replace(read, value);
     }
     Ok(text + FORWARD)
 }
