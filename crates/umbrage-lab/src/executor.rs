@@ -53,8 +53,11 @@ impl<'a> RenderScene<'a> {
         let filter = technique.filter;
         let work = match self.gpu_for(technique) {
             Some((gpu, buffers)) => {
-                let buffers = LookupBuffers::for_technique(technique, 1);
-                let options = ShadowOptions { filter, buffers, ..ShadowOptions::default() };
+                let options = ShadowOptions {
+                    filter,
+                    buffers: LookupBuffers::for_technique(technique, 1),
+                    ..ShadowOptions::default()
+                };
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
                 let is_prefiltered = filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();

@@ -459,7 +459,7 @@ mod tests {
             (sun(), "uniform(stable)+z2", AFFINE),
             (sun(), "lispsm", ONE_POINT),
             (sun(), "adaptive+face", ONE_POINT),
-            (sun(), "psm", GENERAL),
+            (sun(), "psm", ONE_POINT),
             (spot(), "uniform", GENERAL),
         ] {
             let (lookup, _) = filled(light, technique);
