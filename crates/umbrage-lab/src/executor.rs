@@ -8,7 +8,7 @@ use umbrage::{Plan, Technique};
 use umbrage_render::{Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer};
-use umbrage_wgpu::{Casters, ShadowOptions};
+use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
 
 /// A scene that is ready to be rendered, by rays on the CPU and, if there is one, on a GPU.
 pub struct RenderScene<'a> {
@@ -53,7 +53,11 @@ impl<'a> RenderScene<'a> {
         let filter = technique.filter;
         let work = match self.gpu_for(technique) {
             Some((gpu, buffers)) => {
-                let options = ShadowOptions { filter, ..ShadowOptions::default() };
+                let options = ShadowOptions {
+                    filter,
+                    buffers: LookupBuffers::for_technique(technique, 1),
+                    ..ShadowOptions::default()
+                };
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
                 let is_prefiltered = filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();

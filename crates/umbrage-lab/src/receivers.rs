@@ -1,6 +1,6 @@
 //! Receivers: the places where shadows can fall.
 
-use umbrage::{Aabb, Bounds};
+use umbrage::{Aabb, Bounds, BoxTree};
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
 
@@ -26,7 +26,7 @@ impl Fit {
 /// The receivers of a scene, as the planner gets them.
 pub struct Receivers {
     all: Aabb,
-    parts: Vec<Aabb>,
+    parts: Option<BoxTree>,
 }
 
 /// Largest number of boxes around surfaces. More make planning slower and the maps hardly finer.
@@ -37,17 +37,20 @@ impl Receivers {
     pub fn new(scene: &Scene, tracer: &Tracer<'_>, fit: Fit) -> Self {
         match fit {
             Fit::Box => Self::in_box(scene),
-            Fit::Surfaces => Self { parts: tracer.boxes(SURFACE_BOXES), ..Self::in_box(scene) },
+            Fit::Surfaces => {
+                let parts = BoxTree::new(&tracer.boxes(SURFACE_BOXES)).ok();
+                Self { parts, ..Self::in_box(scene) }
+            }
         }
     }
 
     /// Returns the bounding box of the scene as the only receiver. This needs no tracer.
     pub fn in_box(scene: &Scene) -> Self {
-        Self { all: scene.bounds(), parts: Vec::new() }
+        Self { all: scene.bounds(), parts: None }
     }
 
     /// Returns the receivers as bounds for the planner.
     pub fn bounds(&self) -> Bounds<'_> {
-        Bounds { receiver_parts: &self.parts, ..Bounds::of_scene(self.all) }
+        Bounds { receiver_parts: self.parts.as_ref(), ..Bounds::of_scene(self.all) }
     }
 }

@@ -13,7 +13,7 @@
 
 use glam::{DQuat, DVec3};
 use std::time::Instant;
-use umbrage::{Bounds, Camera, Light, LookAt, Planner, Size, SpotLight, Technique};
+use umbrage::{Bounds, BoxTree, Camera, Light, LookAt, Planner, Size, SpotLight, Technique};
 use umbrage_render::{Drawn, Gpu, Renderer, SceneBuffers};
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -46,8 +46,8 @@ fn main() -> Result<(), Failure> {
     println!("{}", gpu.info().name);
     let scene = umbrage_scene::builtin("lamps", None)?;
     let buffers = SceneBuffers::new(&gpu, &scene, false)?;
-    let boxes = Tracer::new(&scene)?.boxes(256);
-    let bounds = Bounds { receiver_parts: &boxes, ..Bounds::of_scene(scene.bounds()) };
+    let boxes = BoxTree::new(&Tracer::new(&scene)?.boxes(256))?;
+    let bounds = Bounds { receiver_parts: Some(&boxes), ..Bounds::of_scene(scene.bounds()) };
     let look = scene.cameras[0].look_at([1920, 1080]);
     println!("{} instances, {} lights", scene.instances.len(), scene.lights.len());
     let motions = [

@@ -11,7 +11,7 @@ use glam::DVec3;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
-use umbrage::{Aabb, Bounds, Camera, Light, LookAt, Planner, Technique};
+use umbrage::{Aabb, Bounds, BoxTree, Camera, Light, LookAt, Planner, Technique};
 use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 
@@ -94,7 +94,8 @@ fn planning(criterion: &mut Criterion) {
             image: [960, 540],
         });
         let camera = camera.expect("a valid camera");
-        let bounds = Bounds { receiver_parts: &case.parts, ..Bounds::of_scene(case.all) };
+        let parts = (!case.parts.is_empty()).then(|| BoxTree::new(&case.parts).expect("sound boxes"));
+        let bounds = Bounds { receiver_parts: parts.as_ref(), ..Bounds::of_scene(case.all) };
         let mut group = criterion.benchmark_group(&case.name);
         group.sample_size(10).warm_up_time(Duration::from_millis(500));
         group.measurement_time(Duration::from_secs(2));

@@ -8,7 +8,7 @@ use glam::DVec2;
 use std::path::Path;
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, texel_coordinates};
-use umbrage::{Bounds, Camera, Plan, Planner, Receiver, Technique, Warp};
+use umbrage::{Bounds, BoxTree, Camera, Plan, Planner, Receiver, Technique, Warp};
 use umbrage_scene::Scene;
 use umbrage_testing::{needs, third_party_scenes};
 use umbrage_trace::{DepthMap, Reference, Tracer, View};
@@ -48,11 +48,8 @@ fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let v = scene.default_view();
     let camera = Camera::look_at(v.look_at([480, 270])).unwrap();
     let light = scene.default_light().light;
-    let boxes = tracer.boxes(256);
-    let bounds = Bounds {
-        receiver_parts: Some(&umbrage::BoxTree::new(&boxes).unwrap()),
-        ..Bounds::of_scene(scene.bounds())
-    };
+    let boxes = BoxTree::new(&tracer.boxes(256)).unwrap();
+    let bounds = Bounds { receiver_parts: Some(&boxes), ..Bounds::of_scene(scene.bounds()) };
     let plan_for = |filter| {
         let technique = Technique { warp: Warp::Uniform, filter, ..Technique::default() };
         Planner::new().plan(&camera, &[light], &bounds, &technique).unwrap().clone()

@@ -12,7 +12,7 @@ mod headless;
 use bytemuck::{bytes_of, cast_slice};
 use glam::{DAffine3, DVec3, Vec3, camera::rh};
 use std::error::Error;
-use umbrage::{Aabb, Bounds, Camera, ClipDepth, Light, Planner, Technique};
+use umbrage::{Aabb, Bounds, BoxTree, Camera, ClipDepth, Light, Planner, Technique};
 use umbrage_wgpu::{
     CasterInstance, Casters, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows, Support,
     Timestamps,
@@ -84,7 +84,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let around =
         |m: DAffine3| Aabb::around(corners.map(|corner| m.transform_point3(corner.as_dvec3())));
     let boxes: Vec<Aabb> = models().map(around).collect();
-    let bounds = Bounds { receiver_parts: &boxes, ..Bounds::default() };
+    let receivers = BoxTree::new(&boxes)?;
+    let bounds = Bounds { receiver_parts: Some(&receivers), ..Bounds::default() };
     let technique: Technique = "adaptive+z2:pcf3".parse()?;
     let mut planner = Planner::with_limits(support.limits());
     let plan = planner.plan(&camera, &[Light::Directional { direction }], &bounds, &technique)?;

@@ -16,16 +16,19 @@ pub enum Error {
     /// The maps of the plan do not fit into a texture of this device.
     #[error(transparent)]
     NoRoom(#[from] AtlasTooLarge),
-    /// The plan has more lights, maps or planes than fit into the uniform buffers of this device.
-    /// Devices with storage buffers have no such limit.
-    #[error("{given} {what}, but this device, which has no storage buffers, can take {max} only")]
+    /// The plan has more lights, maps or planes than fit into uniform buffers. Storage buffers, on
+    /// devices that have them, have no such limit: see
+    /// [`LookupBuffers`](crate::LookupBuffers).
+    #[error(
+        "{given} {what}, but uniform buffers hold {max} only: take storage buffers if the device has them"
+    )]
     TooMany {
         /// The elements that are too many: lights, maps, or planes around the parts of the view
         /// that maps serve.
         what: &'static str,
         /// The number of these elements in the plan.
         given: usize,
-        /// The greatest possible number on this device.
+        /// The greatest possible number.
         max: usize,
     },
     /// A map has logarithmic rows ([`Warp::Log`](umbrage::Warp::Log)), which no GPU can rasterise.

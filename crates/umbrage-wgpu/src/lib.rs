@@ -25,13 +25,17 @@
 //!
 //! # Bias
 //!
-//! There is none to tune. The lookup takes the map's own Jacobian at the receiver. From this follow
-//! the depth that the receiver's plane has at each texel, and what a texel cannot tell (see
-//! [`umbrage::visibility`]). The lookup needs the normal of the *triangle*: interpolated normals
+//! There is none to tune. The map's matrix and the receiver's plane alone give the depth that this
+//! plane has at each texel, and what a texel cannot tell (see [`umbrage::visibility`]). The lookup needs the normal of the *triangle*: interpolated normals
 //! bend away from the triangle's plane, and the surface then shadows itself. [`Bias`] adds a margin
 //! where the geometry that casts is coarser than the geometry that receives.
 //!
 //! # What a frame costs
+//!
+//! A lookup is straight-line code for each filter, and costs least under maps without a warp, then
+//! under warps of parallel light. A light with one map needs no search for it; slices without
+//! overlaps are found by their distance along the view. Faces, overlaps and lamps test planes in
+//! a loop. [`LookupBuffers`] has the kinds of buffers.
 //!
 //! A map whose matrix, size and casters are as they were is not drawn again. With
 //! [`Casters::Unmoved`] and a camera that does not move, nothing is encoded at all. With
@@ -71,7 +75,9 @@ pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
 pub use redraw::Redraw;
-pub use shadows::{Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, ShadowOptions, Shadows};
+pub use shadows::{
+    Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, LookupBuffers, ShadowOptions, Shadows,
+};
 pub use support::Support;
 
 // Their types are in this API: whoever names them by these paths has the versions that fit.

@@ -11,7 +11,7 @@ use glam::{DMat4, DVec3};
 pub(crate) use resources::DepthTexture;
 use resources::{Buffers, CasterBuffer, view_dimension};
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Place, Plan, Plane, Rows, ShadowMap, Slab};
+use umbrage::{Aabb, Faces, Place, Plan, Plane, Rows, ShadowMap, Slab, Technique};
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType,
     BufferBindingType, CompareFunction, DepthStencilState, Device, Extent3d, FilterMode,
@@ -33,6 +33,44 @@ pub struct ShadowOptions {
     pub comparison: Comparison,
     /// Whether maps share one layer of the depth texture or have a layer each.
     pub layout: Layout,
+    /// The kind of the buffers from which lookups read what they need to know of the maps.
+    /// [`Shadows::options`] gives the choice that the device allowed.
+    pub buffers: LookupBuffers,
+}
+
+/// The kind of the buffers from which lookups read lights, maps and planes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LookupBuffers {
+    /// Uniform buffers, which many devices read faster than storage buffers. They hold at most 16
+    /// lights, 64 maps and 512 planes around what maps serve; [`Shadows::prepare`] returns
+    /// [`Error::TooMany`] for larger plans. That is room for one light of almost any technique;
+    /// [`for_technique`](Self::for_technique) tells.
+    #[default]
+    Uniform,
+    /// Storage buffers, which hold any number. Devices that have none take uniform buffers in their
+    /// place.
+    Storage,
+}
+
+impl LookupBuffers {
+    /// Uniform buffers if they hold the maps that a technique makes for this many lights, even if
+    /// all of them are point lights; otherwise storage buffers.
+    pub fn for_technique(technique: &Technique, lights: usize) -> Self {
+        const CUBE_SIDES: usize = 6;
+        let [faces, face_planes] = match technique.partition.faces {
+            Faces::Whole => [1, 0],
+            Faces::Sides => [4, 3],
+            Faces::SidesAndNear => [5, 4],
+        };
+        // A pyramid of light has up to six planes. A slice has two ends, and the view has one.
+        let planes = 6 + 2 + 1 + face_planes;
+        let of_light = CUBE_SIDES * faces * technique.partition.slices as usize;
+        let maps = lights.saturating_mul(of_light);
+        let fits = lights <= wgsl::MAX_LIGHTS
+            && maps <= wgsl::MAX_MAPS
+            && maps.saturating_mul(planes) <= wgsl::MAX_PLANES;
+        if fits { Self::Uniform } else { Self::Storage }
+    }
 }
 
 /// What compares a receiver's depth with the depths of the texels around it.
@@ -206,7 +244,9 @@ impl Shadows {
             _ if !support.depth_fetch => Comparison::Hardware,
             comparison => comparison,
         };
-        let options = ShadowOptions { comparison, ..*options };
+        let buffers =
+            if support.storage_buffers { options.buffers } else { LookupBuffers::Uniform };
+        let options = ShadowOptions { comparison, buffers, ..*options };
         let filter_mode = match options.filter {
             Filter::Prefiltered(_) => FilterMode::Linear,
             Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
@@ -225,7 +265,7 @@ impl Shadows {
             ..SamplerDescriptor::default()
         });
         let lookup_layout = lookup_layout(device, &support, &options);
-        let buffers = Buffers::new(device, &support);
+        let buffers = Buffers::new(device, options.buffers);
         let texture = DepthTexture::new(device, &support, options.layout, [1, 1], 1);
         let prefiltering = match options.filter.prefilter() {
             Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
@@ -322,7 +362,7 @@ impl Shadows {
     /// The text cannot be a package that is known at build time, because its bindings depend on the
     /// device ([`Support`]) and its constants on the filter.
     pub fn lookup_wgsl(&self, group: u32) -> String {
-        wgsl::lookup(group, &self.options, self.support.storage_buffers)
+        wgsl::lookup(group, &self.options)
     }
 
     /// The text of [`lookup_wgsl`](Self::lookup_wgsl) for shaders that look several [`Shadows`] up,
@@ -480,8 +520,8 @@ impl Shadows {
     /// - [`Error::LogarithmicRows`] if a GPU cannot draw a map.
     /// - [`Error::NoRoom`], or [`Error::Invalid`] with [`Layout::Layers`], if the maps do not fit
     ///   into the device's textures.
-    /// - [`Error::TooMany`] if a device without storage buffers cannot take as many lights, maps or
-    ///   planes.
+    /// - [`Error::TooMany`] if there are more lights, maps or planes than uniform buffers hold, and
+    ///   lookups read these (see [`LookupBuffers`]).
     /// - [`Error::Invalid`] if `frame.render_origin` is not finite, or a box of `frame.casters` is
     ///   not within 1e12 metres of the world's origin.
     ///
@@ -529,7 +569,7 @@ impl Shadows {
                 bias: self.bias,
             },
         );
-        self.lookup.check(&self.support)?;
+        self.lookup.check(self.options.buffers)?;
         let mut rebind = false;
         if !self.texture.holds(size, layers) {
             self.texture =
@@ -539,7 +579,7 @@ impl Shadows {
             }
             rebind = true;
         }
-        rebind |= self.buffers.hold(device, &self.support, &self.lookup);
+        rebind |= self.buffers.hold(device, self.options.buffers, &self.lookup);
         if rebind {
             let view = looked_up(&self.texture, self.prefiltering.as_ref());
             self.lookup_bind_group =
@@ -614,10 +654,9 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
     } else {
         ShaderStages::FRAGMENT
     };
-    let array = if support.storage_buffers {
-        BufferBindingType::Storage { read_only: true }
-    } else {
-        BufferBindingType::Uniform
+    let array = match options.buffers {
+        LookupBuffers::Uniform => BufferBindingType::Uniform,
+        LookupBuffers::Storage => BufferBindingType::Storage { read_only: true },
     };
     let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let types = [

@@ -9,8 +9,8 @@ use wgpu::{
 ///
 /// - [`Features::DEPTH_CLIP_CONTROL`], the fragment shader clamps the depths of casters in front of
 ///   a map's depth range and writes them: the same picture, but slower;
-/// - storage buffers in fragment shaders (WebGL2), lookups read uniform buffers, which hold at most
-///   16 lights, 64 maps and 512 planes;
+/// - storage buffers in fragment shaders (WebGL2), lookups always read uniform buffers (see
+///   [`LookupBuffers`](crate::LookupBuffers));
 /// - fetching depths (OpenGL, WebGL2), `hard` and `pcf` compare by
 ///   [`Comparison::Hardware`](crate::Comparison::Hardware) in place of `PerTexel`, and all other
 ///   filters are [`Error::Unsupported`];

@@ -13,7 +13,7 @@
 
 mod generated;
 
-use crate::{Comparison, Layout, ShadowOptions, Support};
+use crate::{Comparison, Layout, LookupBuffers, ShadowOptions, Support};
 use generated::Axis;
 use std::borrow::Cow;
 use std::fmt::Debug;
@@ -21,8 +21,8 @@ use std::ops::Range;
 use umbrage::visibility::statistic::Statistic;
 use umbrage::visibility::{Blur, Filter, Footprint, Pattern, Prefilter, Width};
 
-/// The greatest numbers of elements on a device without storage buffers: the lengths of the arrays
-/// in `buffers/uniform.wesl`.
+/// The greatest numbers of elements in uniform buffers: the lengths of the arrays in
+/// `buffers/uniform.wesl`.
 pub(crate) const MAX_LIGHTS: usize = 16;
 pub(crate) const MAX_MAPS: usize = 64;
 pub(crate) const MAX_PLANES: usize = 512;
@@ -87,8 +87,8 @@ impl Shader {
 }
 
 /// The text of the lookup, with its bindings in bind group `group`.
-pub(crate) fn lookup(group: u32, options: &ShadowOptions, storage_buffers: bool) -> String {
-    lookup_shader(group, options, storage_buffers).link()
+pub(crate) fn lookup(group: u32, options: &ShadowOptions) -> String {
+    lookup_shader(group, options).link()
 }
 
 /// A shader's text with `name` before all names that begin with `shadow`, `Shadow` or `SHADOW`:
@@ -115,14 +115,18 @@ pub(crate) fn named(text: &str, name: &str) -> String {
     renamed
 }
 
-fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> Shader {
-    let ShadowOptions { filter, comparison, layout } = *options;
+fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
+    let ShadowOptions { filter, comparison, layout, buffers } = *options;
     let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
     let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
     shader.add([
         module!("maps"),
-        if storage_buffers { module!("buffers/storage") } else { module!("buffers/uniform") },
+        match buffers {
+            LookupBuffers::Uniform => module!("buffers/uniform"),
+            LookupBuffers::Storage => module!("buffers/storage"),
+        },
+        module!("choice"),
         module!("receiver"),
     ]);
     if !filter.has_maps() {
@@ -145,23 +149,31 @@ fn lookup_shader(group: u32, options: &ShadowOptions, storage_buffers: bool) -> 
             shader.add([compared, module!("hardware"), module!("filter/hardware_hard")]);
         }
         (Filter::Pcf { n }, comparison) => {
-            shader.constant("SHADOW_PCF", n.clamp(1, Filter::MAX_PCF));
-            shader.add([module!("pcf_weight")]);
+            let n = n.clamp(1, Filter::MAX_PCF);
             shader.add(match comparison {
-                Comparison::PerTexel => vec![depths, module!("filter/pcf")],
-                Comparison::Hardware => {
-                    vec![compared, module!("hardware"), module!("filter/hardware_pcf")]
-                }
+                Comparison::PerTexel => vec![depths, generated::pcf(n, layout)],
+                Comparison::Hardware => vec![
+                    compared,
+                    module!("hardware"),
+                    module!("hardware_four"),
+                    generated::hardware_pcf(n),
+                ],
             });
         }
         (Filter::Spread { n, pattern, .. }, _) => {
             shader.add([depths, module!("filter/spread")]);
-            add_square(&mut shader, &filter, n, pattern);
+            add_square(&mut shader, &filter, &places(pattern, n));
         }
         (Filter::Pcss { n, light }, _) => {
             shader.constant("SHADOW_LIGHT_DIAMETER", light.diameter());
-            shader.add([depths, module!("filter/pcss")]);
-            add_square(&mut shader, &filter, n, Pattern::Poisson);
+            let places = places(Pattern::Poisson, n);
+            shader.add([
+                depths,
+                module!("filter/pcss"),
+                module!("blockers"),
+                generated::search(&places),
+            ]);
+            add_square(&mut shader, &filter, &places);
         }
         (Filter::Prefiltered(prefilter), _) => {
             shader.add([
@@ -218,20 +230,25 @@ fn add_reach(shader: &mut Shader, filter: &Filter) {
     shader.constant("SHADOW_REACH_IN_WIDTHS", widths);
 }
 
-/// Adds the comparisons at n² places of a square or a disc.
-fn add_square(shader: &mut Shader, filter: &Filter, n: u32, pattern: Pattern) {
-    let (n, pattern) = match pattern {
-        Pattern::Grid => (n.clamp(1, Filter::MAX_PCF), module!("pattern/grid")),
+/// The n² places of a pattern, in a square of side 1 around 0.
+fn places(pattern: Pattern, n: u32) -> Vec<[f32; 2]> {
+    match pattern {
+        Pattern::Grid => {
+            let n = n.clamp(1, Filter::MAX_PCF);
+            let place = |k: u32| [k % n, k / n].map(|i| (i as f32 + 0.5) / n as f32 - 0.5);
+            (0..n * n).map(place).collect()
+        }
         Pattern::Poisson => {
             let n = n.clamp(1, Filter::MAX_DISC);
-            let places = Filter::disc_places(n * n);
-            shader.constant("SHADOW_DISC", format_args!("{}", vectors(places)));
-            (n, module!("pattern/disc"))
+            Filter::disc_places(n * n).to_vec()
         }
-    };
-    shader.constant("SHADOW_SPREAD", n);
+    }
+}
+
+/// Adds the comparisons at these places of a square or a disc.
+fn add_square(shader: &mut Shader, filter: &Filter, places: &[[f32; 2]]) {
     shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
-    shader.add([module!("square"), pattern]);
+    shader.add([module!("square"), generated::comparisons(places)]);
 }
 
 /// Adds the lookup of a prefiltered map.
@@ -241,14 +258,15 @@ fn add_prefiltered(shader: &mut Shader, prefilter: &Prefilter) {
     shader.constant("SHADOW_ALIGN", filter.align_texels() as f32);
     shader.constant("SHADOW_PLANE_DEVIATIONS", prefilter.statistic.plane_deviations());
     shader.constant("SHADOW_FIRST_LEVEL", prefilter.first_level());
-    shader.add([module!("footprints"), module!("slab")]);
+    shader.add([
+        module!("footprints"),
+        module!("slab"),
+        generated::samples(textures(&prefilter.statistic)),
+    ]);
     match prefilter.blur {
         Blur::Texels(_) => {
             shader.constant("SHADOW_VARIANCE", prefilter.variance_texels() as f32);
-            shader.add([
-                module!("footprint/texels"),
-                generated::samples(textures(&prefilter.statistic)),
-            ]);
+            shader.add([module!("footprint/texels")]);
         }
         Blur::Width(_) => {
             let variance = Prefilter::DEVIATION * Prefilter::DEVIATION;
@@ -260,7 +278,8 @@ fn add_prefiltered(shader: &mut Shader, prefilter: &Prefilter) {
             shader.constant("SHADOW_ANISOTROPY_SQUARED", Footprint::ANISOTROPY.powi(2) as f32);
             shader.constant("SHADOW_KEPT_VARIANCE", Footprint::KEPT_VARIANCE as f32);
             shader.constant("SHADOW_MAX_SAMPLES", Footprint::MAX_SAMPLES as f32);
-            shader.add([module!("footprint/width")]);
+            shader
+                .add([module!("footprint/width"), generated::sums(textures(&prefilter.statistic))]);
         }
     }
     add_statistic(shader, &prefilter.statistic);
@@ -304,7 +323,7 @@ fn add_statistic(shader: &mut Shader, statistic: &Statistic) {
             shader.constant("SHADOW_CSM_SHIFT", s.shift() / s.shrink());
             shader.constant("SHADOW_CSM_GAIN", s.gain());
             shader.constant("SHADOW_LEAK", s.leak());
-            shader.add([module!("statistic/csm")]);
+            shader.add([generated::csm(textures(statistic)), module!("turned")]);
         }
     }
 }
@@ -340,11 +359,16 @@ fn prefilter_shader(prefilter: &Prefilter, pass: PrefilterPass, range: Range<u32
             let mut shader = Shader::new(module!("encode"));
             shader.add([
                 module!("prefilter"),
-                if prefilter.half { module!("encoded/half") } else { module!("encoded/full") },
                 module!("texel_statistics"),
                 module!("slab"),
                 generated::encoded_outputs(range),
             ]);
+            if prefilter.half {
+                let sums = generated::sums(textures(&prefilter.statistic));
+                shader.add([module!("encoded/half"), sums]);
+            } else {
+                shader.add([module!("encoded/full")]);
+            }
             add_statistic(&mut shader, &prefilter.statistic);
             return shader;
         }

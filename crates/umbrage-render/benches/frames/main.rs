@@ -110,7 +110,7 @@ struct Set<'a> {
     case: &'a Case,
     buffers: SceneBuffers<'a>,
     camera: Camera,
-    boxes: Vec<umbrage::Aabb>,
+    boxes: umbrage::BoxTree,
     target: FrameTarget,
     /// `None` if the GPU has no timestamps. Times are then taken from the wall clock.
     timer: Option<Timer>,
@@ -132,7 +132,7 @@ impl<'a> Set<'a> {
             case,
             buffers: SceneBuffers::new(gpu, &case.scene, true)?,
             camera: Camera::look_at(case.look_at(image))?,
-            boxes: Tracer::new(&case.scene)?.boxes(256),
+            boxes: umbrage::BoxTree::new(&Tracer::new(&case.scene)?.boxes(256))?,
             target: FrameTarget::new(gpu, image)?,
             timer: Timer::new(gpu),
         })
@@ -148,7 +148,7 @@ impl<'a> Set<'a> {
         technique: &Technique,
     ) -> Result<&'p Plan, Failure> {
         let bounds = Bounds::of_scene(self.case.scene.bounds());
-        let bounds = Bounds { receiver_parts: &self.boxes, ..bounds };
+        let bounds = Bounds { receiver_parts: Some(&self.boxes), ..bounds };
         Ok(planner.plan(&self.camera, &[self.case.light], &bounds, technique)?)
     }
 

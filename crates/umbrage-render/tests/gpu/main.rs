@@ -6,7 +6,7 @@ mod trouble;
 
 use std::path::Path;
 use std::sync::LazyLock;
-use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner, Technique};
+use umbrage::{Bounds, BoxTree, Camera, Light, Limits, Plan, Planner, Technique};
 use umbrage_render::Gpu;
 use umbrage_scene::Scene;
 use umbrage_testing::third_party_scenes;
@@ -31,7 +31,7 @@ pub(crate) struct Set<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) tracer: Tracer<'a>,
     pub(crate) camera: Camera,
-    boxes: Vec<Aabb>,
+    boxes: BoxTree,
     light: Light,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Set<'a> {
         let tracer = Tracer::new(scene).unwrap();
         let v = scene.default_view();
         let look = v.look_at(image);
-        let boxes = tracer.boxes(64);
+        let boxes = BoxTree::new(&tracer.boxes(64)).unwrap();
         // Choosing view and light takes seconds in a large scene that brings none.
         let light = scene.light_for_view(&v).light;
         Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes, light }
@@ -52,7 +52,7 @@ impl<'a> Set<'a> {
 
     pub(crate) fn plan(&self, lights: &[Light], technique: &Technique) -> Plan {
         let bounds =
-            Bounds { receiver_parts: &self.boxes, ..Bounds::of_scene(self.scene.bounds()) };
+            Bounds { receiver_parts: Some(&self.boxes), ..Bounds::of_scene(self.scene.bounds()) };
         let mut planner = Planner::with_limits(Limits { max_side: 65536, ..Limits::default() });
         planner.plan(&self.camera, lights, &bounds, technique).unwrap().clone()
     }

@@ -8,7 +8,7 @@ use umbrage::{Camera, Light, Plan, Size, SpotLight, Technique};
 use umbrage_render::{Renderer, Sample, SceneBuffers, Shading};
 use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
-use umbrage_wgpu::{Casters, Comparison, Layout, ShadowOptions, Support};
+use umbrage_wgpu::{Casters, Comparison, Layout, LookupBuffers, ShadowOptions, Support};
 
 const IMAGE: [u32; 2] = [240, 135];
 
@@ -268,6 +268,7 @@ fn every_fallback_draws_the_same_picture() {
         for (lacking, options, support) in [
             ("clamping", base, Support { depth_clip_control: false, ..all }),
             ("storage", base, Support { storage_buffers: false, ..all }),
+            ("uniforms", ShadowOptions { buffers: LookupBuffers::Storage, ..base }, all),
             ("layers", ShadowOptions { layout: Layout::Layers, ..base }, all),
         ] {
             let name = format!("town without {lacking}");

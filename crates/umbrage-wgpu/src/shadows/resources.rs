@@ -1,6 +1,6 @@
 //! The textures and buffers in which the maps, and what lookups and casters need of them, lie.
 
-use super::{DEPTH_FORMAT, Layout, Record};
+use super::{DEPTH_FORMAT, Layout, LookupBuffers, Record};
 use crate::Support;
 use crate::data::{self, CasterMap, Lookup};
 use crate::wgsl::{MAX_LIGHTS, MAX_MAPS, MAX_PLANES};
@@ -109,24 +109,26 @@ impl DepthTexture {
 }
 
 impl Buffers {
-    pub(super) fn new(device: &Device, support: &Support) -> Self {
+    pub(super) fn new(device: &Device, kind: LookupBuffers) -> Self {
         // The arrays in uniform buffers have a fixed length.
-        let [lights, maps, planes] =
-            if support.storage_buffers { [1; 3] } else { [MAX_LIGHTS, MAX_MAPS, MAX_PLANES] };
+        let [lights, maps, planes] = match kind {
+            LookupBuffers::Uniform => [MAX_LIGHTS, MAX_MAPS, MAX_PLANES],
+            LookupBuffers::Storage => [1; 3],
+        };
         Self {
             settings: buffer(device, size_of::<data::Settings>(), BufferUsages::UNIFORM),
-            lights: array::<data::Light>(device, support, lights),
-            maps: array::<data::Map>(device, support, maps),
-            planes: array::<[f32; 4]>(device, support, planes),
+            lights: array::<data::Light>(device, kind, lights),
+            maps: array::<data::Map>(device, kind, maps),
+            planes: array::<[f32; 4]>(device, kind, planes),
         }
     }
 
     /// Replaces the buffers that are too small for `lookup`; `true` if any was replaced.
-    pub(super) fn hold(&mut self, device: &Device, support: &Support, lookup: &Lookup) -> bool {
+    pub(super) fn hold(&mut self, device: &Device, kind: LookupBuffers, lookup: &Lookup) -> bool {
         let mut has_grown = false;
         let mut hold = |buffer: &mut Buffer, bytes: usize| {
             if buffer.size() < bytes as u64 {
-                *buffer = array::<u8>(device, support, bytes.next_power_of_two());
+                *buffer = array::<u8>(device, kind, bytes.next_power_of_two());
                 has_grown = true;
             }
         };
@@ -240,7 +242,10 @@ fn buffer(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
 }
 
 /// A buffer for `n` elements that lookup reads.
-fn array<T>(device: &Device, support: &Support, n: usize) -> Buffer {
-    let usage = if support.storage_buffers { BufferUsages::STORAGE } else { BufferUsages::UNIFORM };
+fn array<T>(device: &Device, kind: LookupBuffers, n: usize) -> Buffer {
+    let usage = match kind {
+        LookupBuffers::Uniform => BufferUsages::UNIFORM,
+        LookupBuffers::Storage => BufferUsages::STORAGE,
+    };
     buffer(device, size_of::<T>() * n, usage)
 }

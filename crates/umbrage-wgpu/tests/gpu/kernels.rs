@@ -10,7 +10,9 @@ use umbrage::visibility::{
 };
 use umbrage::{Faces, Plan, Technique};
 use umbrage_testing::needs;
-use umbrage_wgpu::{Bias, Casters, Comparison, Frame, Layout, ShadowOptions, Shadows, Timestamps};
+use umbrage_wgpu::{
+    Bias, Casters, Comparison, Frame, Layout, LookupBuffers, ShadowOptions, Shadows, Timestamps,
+};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
@@ -78,8 +80,9 @@ fn technique(text: &str) -> Technique {
     text.parse().unwrap()
 }
 
-const TECHNIQUES: [&str; 8] = [
+const TECHNIQUES: [&str; 9] = [
     "unfocused@256",
+    "uniform+z7@256",
     "uniform+z4@256",
     "uniform(stable)+z2@256",
     "psm@256",
@@ -227,6 +230,7 @@ fn every_filter_and_layout_is_looked_up_as_in_rust() {
             agrees(&ShadowOptions { filter, layout, ..Default::default() }, &technique, None);
         }
         let hard = ShadowOptions { layout, ..Default::default() };
+        agrees(&ShadowOptions { buffers: LookupBuffers::Storage, ..hard }, &technique, None);
         agrees(&hard, &technique, None);
         // A single texel has one depth to compare with, so both kinds of comparison must agree.
         agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &technique, None);
@@ -320,7 +324,7 @@ struct Out { texel: vec2f, slope: vec2f, depth: f32, slack: f32, weight: f32, pa
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if (id.x < arrayLength(&points)) {
         let p = points[id.x];
-        let r = shadow_receiver(shadow_point(p.map, p.position), p.normal);
+        let r = shadow_receiver(p.map, p.position, p.normal);
         out[id.x] = Out(r.texel, r.slope, r.depth, r.slack, shadow_weight(p.map, p.position), 0.0);
     }
 }";

@@ -172,8 +172,8 @@ fn maps_of_one_depth_do_not_mix_with_their_neighbours() {
             fn main(@builtin(global_invocation_id) id: vec3u) {
                 if (id.x < arrayLength(&inputs)) {
                     let i = inputs[id.x];
-                    let near = ShadowReceiver(i.texel, 0.05, vec2f(0.0), 0.0, vec3f(0.0), 1.0, vec2f(0.0));
-                    let middle = ShadowReceiver(i.texel, 0.5, vec2f(0.0), 0.0, vec3f(0.0), 1.0, vec2f(0.0));
+                    let near = ShadowReceiver(i.texel, 0.05, vec2f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
+                    let middle = ShadowReceiver(i.texel, 0.5, vec2f(0.0), 0.0, vec3f(0.0), vec3f(0.0));
                     out[id.x] = vec2f(shadow_filtered(i.map, near), shadow_filtered(i.map, middle));
                 }
             }";

@@ -8,7 +8,7 @@ use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
 use umbrage::{Faces, Partition, Size, Technique, Warp};
 use umbrage_testing::needs;
 use umbrage_wgpu::{
-    Bias, Casters, Error, Frame, Layout, ShadowOptions, Shadows, Support, Timestamps,
+    Bias, Casters, Error, Frame, Layout, LookupBuffers, ShadowOptions, Shadows, Support, Timestamps,
 };
 
 fn prepare(
@@ -112,11 +112,18 @@ fn vsm() -> Filter {
 fn what_a_small_device_cannot_hold_is_said_before_anything_is_drawn() {
     let bench = bench();
     let small = Support { storage_buffers: false, max_side: 512, max_layers: 4, ..bench.support };
-    let mut shadows = Shadows::new(&bench.device, small, &ShadowOptions::default()).unwrap();
+    let options = ShadowOptions { buffers: LookupBuffers::Storage, ..ShadowOptions::default() };
+    let mut shadows = Shadows::new(&bench.device, small, &options).unwrap();
+    assert_eq!(shadows.options().buffers, LookupBuffers::Uniform);
     let faces = Partition { faces: Faces::SidesAndNear, ..Partition::slices(16) };
     let many = Technique { partition: faces, size: Size::Exact([2, 2]), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &many, DVec3::ZERO).unwrap_err();
     assert!(matches!(error, Error::TooMany { .. }), "{error}");
+    // Storage buffers hold as many, where the device has them.
+    let able = Support { storage_buffers: true, ..small };
+    let mut with_storage = Shadows::new(&bench.device, able, &options).unwrap();
+    prepare(&bench, &mut with_storage, &many, DVec3::ZERO).unwrap();
+    assert_eq!(LookupBuffers::for_technique(&many, 1), LookupBuffers::Storage);
     let large = Technique { size: Size::Exact([600, 2]), ..Technique::default() };
     let error = prepare(&bench, &mut shadows, &large, DVec3::ZERO).unwrap_err();
     assert!(matches!(error, Error::NoRoom(_)), "{error}");
