@@ -1,4 +1,5 @@
 use crate::error::{Error, check, check_position};
+use crate::seen::Seen;
 use glam::DVec3;
 
 /// An axis-aligned box in world space, metres.
@@ -89,6 +90,9 @@ pub struct Bounds<'a> {
     /// boxes, one for each object say, save the texels of that air. Planning time grows in
     /// proportion to the number of boxes.
     pub receiver_parts: &'a [Aabb],
+    /// What the camera saw in this frame or a frame or two before. Maps are then fitted to that in
+    /// place of the boxes, which are still needed for what has come into view since.
+    pub seen: Option<Seen<'a>>,
     /// A box around everything that casts shadows. `None` if unknown; then casters may lie anywhere
     /// towards the light. Only maps with [`Cover::Scene`](crate::Cover::Scene) and maps that [keep
     /// their casters' depths](crate::visibility::Filter::keeps_casters) have to include the casters
@@ -100,12 +104,14 @@ pub struct Bounds<'a> {
 impl Bounds<'_> {
     /// Bounds of one box that contains both receivers and casters.
     pub fn of_scene(scene: Aabb) -> Self {
-        Self { receivers: Some(scene), receiver_parts: &[], casters: Some(scene) }
+        Self { receivers: Some(scene), receiver_parts: &[], seen: None, casters: Some(scene) }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.receivers.map_or(Ok(()), |b| b.check("bounds.receivers"))?;
         self.receiver_parts.iter().try_for_each(|b| b.check("bounds.receiver_parts"))?;
+        let moving = self.seen.map_or(&[][..], |seen| seen.moving);
+        moving.iter().try_for_each(|b| b.check("bounds.seen.moving"))?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
     }
 }

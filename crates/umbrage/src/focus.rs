@@ -41,6 +41,10 @@ struct Buffers {
     loops: Vec<u32>,
 }
 
+/// Corners of a box's faces, counter-clockwise as seen from outside.
+const BOX_FACES: [[u32; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
 impl Body {
     /// Replaces the body by the camera's frustum, relative to the eye.
     pub(crate) fn set_frustum(&mut self, camera: &Camera) {
@@ -87,10 +91,20 @@ impl Body {
         let min = DVec3::from([0, 2, 4].map(|i| -sides[i].offset));
         let max = DVec3::from([1, 3, 5].map(|i| sides[i].offset));
         self.vertices.extend(Aabb { min, max }.corners());
-        let faces =
-            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        for (plane, face) in sides.into_iter().zip(faces) {
+        for (plane, face) in sides.into_iter().zip(BOX_FACES) {
             self.push_face(plane, &face);
+        }
+    }
+
+    /// Replaces the body by a convex body with the topology of a box, whose faces are plane, given
+    /// by its corners (local space) in the order of [`Aabb::corners`].
+    pub(crate) fn set_hexahedron(&mut self, corners: [DVec3; 8]) {
+        self.clear();
+        self.vertices.extend(corners);
+        for face in BOX_FACES {
+            let [a, b, c, d] = face.map(|i| corners[i as usize]);
+            let normal = (d - b).cross(c - a).normalize_or_zero();
+            self.push_face(Plane::through(a, normal), &face);
         }
     }
 

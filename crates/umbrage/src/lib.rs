@@ -46,6 +46,7 @@ mod partition;
 mod plan;
 mod planner;
 mod resolution;
+mod seen;
 mod slab;
 mod stable;
 mod technique;
@@ -63,6 +64,7 @@ pub use plan::{
     Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
 };
 pub use planner::Planner;
+pub use seen::{Seen, SeenTile, SeenTiles};
 pub use technique::language;
 pub use technique::{Cover, Faces, Limits, Objective, Partition, Size, Splits, Technique, Warp};
 

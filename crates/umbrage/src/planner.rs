@@ -6,6 +6,7 @@ use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
 use crate::resolution::resolutions;
+use crate::seen::cells::Cells;
 use crate::technique::{Faces, Limits, Technique};
 use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
@@ -66,6 +67,7 @@ pub struct Planner {
     units: Vec<[f64; 2]>,
     sizes: Vec<[u32; 2]>,
     bodies: Bodies,
+    cells: Cells,
     /// Planes around everything that the camera sees.
     around: Vec<Plane>,
     /// Planes around the part of a light's view that a face of the frustum serves.
@@ -171,11 +173,26 @@ impl Planner {
             self.around.extend(view.sides(local(receivers)));
             view.clip_aabb(local(receivers));
         }
-        if !bounds.receiver_parts.is_empty() {
+        let one_box = bounds.receivers.as_slice();
+        let boxes = if bounds.receiver_parts.is_empty() { one_box } else { bounds.receiver_parts };
+        let cells = bounds.seen.and_then(|seen| self.cells.find(seen, camera, boxes));
+        let parts = match (&cells, bounds.seen) {
+            (Some(_), Some(seen)) => seen.moving,
+            _ => bounds.receiver_parts,
+        };
+        if cells.is_some() || !parts.is_empty() {
             whole.copy_from(view);
             view.clear();
+            for corners in cells.into_iter().flatten() {
+                let is_hidden = |p: &Plane| corners.iter().all(|&c| p.distance(c) < 0.0);
+                if !self.around.iter().any(is_hidden) {
+                    part.set_hexahedron(corners);
+                    self.around.iter().for_each(|&p| part.clip(p));
+                    view.append(part);
+                }
+            }
             let seen = Aabb::around(whole.vertices().iter().copied());
-            for &aabb in bounds.receiver_parts {
+            for &aabb in parts {
                 // Vertices cut out of a vast box would lose as many digits as the box's size takes
                 // up, so the box is first intersected with what is seen.
                 let aabb = local(aabb).intersection(seen);

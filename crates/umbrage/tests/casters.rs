@@ -216,7 +216,7 @@ fn casters_beside_a_map_count_as_far_as_filters_reach() {
     let camera = camera(60.0);
     let light = Light::Directional { direction: DVec3::new(0.2, -1.0, 0.1) };
     let floor = Aabb::new(DVec3::new(-10.0, 0.0, -40.0), DVec3::new(10.0, 0.1, 10.0));
-    let bounds = Bounds { receivers: Some(floor), casters: None, receiver_parts: &[] };
+    let bounds = Bounds { receivers: Some(floor), ..Bounds::default() };
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage)] {
         let mut planner = planner();
         let mut misses = |filter| {
