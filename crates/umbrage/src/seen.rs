@@ -13,6 +13,8 @@ use glam::DVec2;
 
 pub(crate) mod cells;
 mod motion;
+#[cfg(test)]
+mod tests;
 
 /// What a tile of the picture shows: all its receivers lie between two parallel planes of inverse
 /// depth.
@@ -169,6 +171,10 @@ impl SeenTiles {
 
 const BEYOND: f64 = 2.0;
 
+/// How far leaning planes may leave the points' range of inverse depths, as a share of the range.
+/// Half a pixel beyond the outermost pixel centres needs a little.
+const MOST_OVERSHOOT: f64 = 0.05;
+
 /// The pixels of a tile of a grid: left, upper, right and lower edge.
 fn tile_pixels([width, height]: [u32; 2], [across, down]: [u32; 2], index: usize) -> [u32; 4] {
     let [x, y] = [index as u64 % u64::from(across), index as u64 / u64::from(across)];
@@ -247,8 +253,8 @@ struct Point {
 }
 
 impl SeenTile {
-    /// The thinner of two tiles around the points: one between planes that face the viewer, and one
-    /// between planes that lean as the points do on the whole.
+    /// A tile around the points, between planes that lean as the points do on the whole, or half as
+    /// much, or that face the viewer.
     fn around<P: Iterator<Item = Point>>(pixels: [f64; 4], points: impl Fn() -> P) -> Self {
         let flat = Self { pixels, slope: DVec2::ZERO, inverse: [0.0; 2], jump: 0.0 };
         let middle = flat.middle();
@@ -258,9 +264,20 @@ impl SeenTile {
             let (_, hi) = range(points().map(|p| p.inverse[1] - above(&p)));
             Self { slope, inverse: [lo, hi], ..flat }
         };
-        let leaning = between(least_squares(middle, points()));
+        let slope = least_squares(middle, points());
         let flat = between(DVec2::ZERO);
-        if leaning.thickness() < flat.thickness() { leaning } else { flat }
+        // Where leaning planes leave the range of the points by much, they do not describe them,
+        // and a corner close to the viewer would cost more texels than the planes save.
+        let [lo, hi] = flat.inverse;
+        let slack = MOST_OVERSHOOT * flat.thickness();
+        [slope, slope / 2.0]
+            .map(between)
+            .into_iter()
+            .find(|t| {
+                let [farthest, nearest] = t.ends();
+                t.thickness() < flat.thickness() && farthest >= lo - slack && nearest <= hi + slack
+            })
+            .unwrap_or(flat)
     }
 
     /// A tile that holds all of these tiles.
@@ -297,9 +314,15 @@ impl SeenTile {
         })
     }
 
+    /// The least and the greatest inverse depth, 1/m.
+    fn ends(&self) -> [f64; 2] {
+        let rise = (self.slope * self.size() / 2.0).abs().element_sum();
+        [self.inverse[0] - rise, self.inverse[1] + rise]
+    }
+
     /// The greatest inverse depth, 1/m.
     fn nearest(&self) -> f64 {
-        self.inverse[1] + (self.slope * self.size() / 2.0).abs().element_sum()
+        self.ends()[1]
     }
 
     fn check(&self) -> Result<(), Error> {

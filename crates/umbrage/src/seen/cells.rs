@@ -82,14 +82,15 @@ impl SeenTile {
         })
     }
 
-    /// How much a cell would be worth opening: its solid angle, times the factor by which depth
-    /// varies in a typical direction.
+    /// How much a cell is worth opening: its part of the picture, times the logarithm of the factor
+    /// by which depth varies, times its nearness, because near receivers set how many texels a map
+    /// needs.
     fn looseness(&self, floor: f64) -> f64 {
         let ratio = self.corners().iter().fold(1.0, |product, c| {
             let [lo, hi] = c.inverse.map(|w| w.max(floor));
             product * (hi / lo)
         });
-        self.size().element_product() * ratio.ln()
+        self.size().element_product() * ratio.ln() * self.nearest()
     }
 }
 
