@@ -108,13 +108,17 @@ impl<'a> Frame<'a> {
         techniques: &[NamedTechnique],
     ) -> Result<Vec<Self>, Error> {
         let MovingView { scene, receivers, look_at, light, .. } = *moving;
+        // What was seen in the frame before serves a frame, as where depths are read back from a
+        // GPU.
+        let mut before = None;
         let frame = |i| {
             let (camera, light) = motion.frame(look_at, light, i)?;
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
             let seen = receivers.seen(scene.tracer(), &camera)?;
-            let bounds = receivers.bounds(seen.as_ref());
+            let bounds = receivers.bounds(before.as_ref().or(seen.as_ref()));
             let plan = |t| planning::plan(t, &camera, &light, &bounds).map(|(plan, _)| plan);
             let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
+            before = seen;
             Ok(Self { view, plans })
         };
         (0..frames).map(frame).collect()

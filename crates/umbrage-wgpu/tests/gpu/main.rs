@@ -5,6 +5,7 @@ mod clamping;
 mod cookbook;
 mod device;
 mod kernels;
+mod seen;
 mod statistics;
 mod trouble;
 
