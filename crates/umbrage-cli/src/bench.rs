@@ -121,7 +121,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let tracer = render_scene.tracer();
     let view = umbrage_trace::View::new(tracer, camera, chosen_light.light, 1)?;
     let receivers = Receivers::new(&scene, tracer, args.techniques.fit.into());
-    let seen = receivers.seen(tracer, &camera)?;
+    let seen = render_scene.seen(&receivers, &camera)?;
     let bounds = receivers.bounds(seen.as_ref());
     tell_notices(&scene);
     announce(&executors);

@@ -52,7 +52,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
-    let seen = receivers.seen(tracer, &chosen.camera)?;
+    let seen = render_scene.seen(&receivers, &chosen.camera)?;
     let bounds = receivers.bounds(seen.as_ref());
     let (plan, _) = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(args.aov);

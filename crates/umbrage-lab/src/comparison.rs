@@ -96,7 +96,7 @@ impl<'a> Comparison<'a> {
         let (camera, light) = (chosen_view.camera, chosen_light.light);
         let view = View::new(prepared.render.tracer(), camera, light, options.samples)
             .about(Field::Samples)?;
-        let seen = prepared.receivers.seen(prepared.render.tracer(), &camera)?;
+        let seen = prepared.render.seen(&prepared.receivers, &camera)?;
         let bounds = prepared.receivers.bounds(seen.as_ref());
         let plan = |t| planning::plan(t, &camera, &light, &bounds);
         let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;

@@ -54,13 +54,18 @@ impl Receivers {
         Self { all: scene.bounds(), parts: Vec::new(), fit: Fit::Box }
     }
 
+    /// Returns whether the maps are fitted to what is seen.
+    pub(crate) fn are_seen(&self) -> bool {
+        self.fit == Fit::Seen
+    }
+
     /// Returns what a camera sees at its pixels' centres, found by rays, if the maps are fitted to
     /// that.
     ///
     /// # Errors
     /// None in practice: rays find no depths that are not positive.
     pub fn seen(&self, tracer: &Tracer<'_>, camera: &Camera) -> Result<Option<SeenTiles>, Error> {
-        if self.fit != Fit::Seen {
+        if !self.are_seen() {
             return Ok(None);
         }
         let [width, height] = camera.image();

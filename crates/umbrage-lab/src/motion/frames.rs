@@ -114,7 +114,7 @@ impl<'a> Frame<'a> {
         let frame = |i| {
             let (camera, light) = motion.frame(look_at, light, i)?;
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
-            let seen = receivers.seen(scene.tracer(), &camera)?;
+            let seen = scene.seen(receivers, &camera)?;
             let bounds = receivers.bounds(before.as_ref().or(seen.as_ref()));
             let plan = |t| planning::plan(t, &camera, &light, &bounds).map(|(plan, _)| plan);
             let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
