@@ -61,6 +61,8 @@ struct TimesJson {
     depth: Option<Spread>,
     filter: Option<Spread>,
     shade: Option<Spread>,
+    /// Until what was seen is back from the GPU; `null` without `--fit seen`.
+    seen: Option<Spread>,
     frame: Option<Spread>,
 }
 
@@ -127,7 +129,8 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     announce(&executors);
     let mut contenders = Vec::new();
     for technique in techniques {
-        let bencher = Bencher::new(&render_scene, technique.technique(), camera.image())?;
+        let bencher =
+            Bencher::new(&render_scene, technique.technique(), &receivers, camera.image())?;
         contenders.push(Contender { technique, bencher, planner: planner(), frames: Vec::new() });
     }
     take_turns(&mut contenders, args, &view, &bounds, quiet)?;
@@ -194,7 +197,10 @@ impl Contender<'_> {
         let first = frames.first().context("frames")?;
         let counted = &frames[WARM_UP as usize..];
         let spread = |value: fn(&Frame) -> f64| Spread::of(counted.iter().map(value));
-        let filter: Option<Vec<f64>> = counted.iter().map(|f| f.costs.filter).collect();
+        let maybe = |value: fn(&Costs) -> Option<f64>| {
+            let values: Option<Vec<f64>> = counted.iter().map(|f| value(&f.costs)).collect();
+            values.and_then(|values| Spread::of(values.into_iter()))
+        };
         Ok(ResultJson {
             shadows: technique.to_string(),
             backend: bencher.executor().name(),
@@ -208,8 +214,9 @@ impl Contender<'_> {
             ms: TimesJson {
                 plan: spread(|f| f.plan),
                 depth: spread(|f| f.costs.depth),
-                filter: filter.and_then(|values| Spread::of(values.into_iter())),
+                filter: maybe(|costs| costs.filter),
                 shade: spread(|f| f.costs.shade),
+                seen: maybe(|costs| costs.seen),
                 frame: spread(|f| f.frame),
             },
             first_ms: FirstJson { depth: first.costs.depth, frame: first.frame },
@@ -257,6 +264,7 @@ fn table(bench: &BenchJson) -> String {
         "depth",
         "filter",
         "shade",
+        "seen",
         "frame",
         "first frame",
         "maps",
@@ -278,6 +286,7 @@ fn table(bench: &BenchJson) -> String {
             ms(r.ms.depth, 2),
             ms(r.ms.filter, 2),
             ms(r.ms.shade, 2),
+            ms(r.ms.seen, 2),
             ms(r.ms.frame, 2),
             format!("{:.2}", r.first_ms.frame),
             r.maps.to_string(),

@@ -25,7 +25,7 @@ fn every_stage_has_its_times() {
             assert_eq!(result["map_draws"].as_array().unwrap().len(), maps);
             assert!(result["map_draws"][0]["triangles"].as_u64().unwrap() > 0);
             assert!(result["bytes"].as_u64().unwrap() >= 4 * result["texels"].as_u64().unwrap());
-            assert_eq!(keys(&result["ms"]), ["depth", "filter", "frame", "plan", "shade"]);
+            assert_eq!(keys(&result["ms"]), ["depth", "filter", "frame", "plan", "seen", "shade"]);
             for stage in ["plan", "depth", "shade", "frame"] {
                 let spread = &result["ms"][stage];
                 let [min, median, max] =
