@@ -86,7 +86,7 @@ impl Receivers {
     /// Returns the receivers as bounds for the planner, together with what was
     /// [seen](Self::seen).
     pub fn bounds<'a>(&'a self, seen: Option<&'a SeenTiles>) -> Bounds<'a> {
-        let seen = seen.map(|tiles| Seen { tiles, moving: &[] });
+        let seen = seen.map(|tiles| Seen { tiles, moving: &[], clearance: 0.0 });
         Bounds { receiver_parts: &self.parts, seen, ..Bounds::of_scene(self.all) }
     }
 }

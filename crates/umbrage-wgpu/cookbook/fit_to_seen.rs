@@ -30,7 +30,8 @@ impl SeenShadows {
 
     /// Before the picture: plans the maps and encodes the passes that draw them. `boxes` hold all
     /// models, because the camera may come to see what it did not see before. `moving` holds the
-    /// models that move, at the places that they have had in the last few frames.
+    /// models that move, at the places that they have had in the last few frames. Nothing
+    /// comes nearer to this camera than 10 cm.
     pub fn draw(
         &mut self,
         (device, queue): (&wgpu::Device, &wgpu::Queue),
@@ -40,7 +41,7 @@ impl SeenShadows {
         draw: impl FnMut(&mut MapPass<'_, '_>),
     ) -> Result<(), Box<dyn Error>> {
         let tiles = self.readback.as_mut().and_then(|readback| readback.latest(device));
-        let seen = tiles.map(|tiles| Seen { tiles, moving });
+        let seen = tiles.map(|tiles| Seen { tiles, moving, clearance: 0.1 });
         let bounds = Bounds { receiver_parts: boxes, seen, ..Bounds::default() };
         let plan = self.planner.plan(camera, lights, &bounds, &self.technique)?;
         let frame = Frame { plan, render_origin: DVec3::ZERO, casters: Casters::Moved };

@@ -112,6 +112,10 @@ impl Bounds<'_> {
         self.receiver_parts.iter().try_for_each(|b| b.check("bounds.receiver_parts"))?;
         let moving = self.seen.map_or(&[][..], |seen| seen.moving);
         moving.iter().try_for_each(|b| b.check("bounds.seen.moving"))?;
+        let clearance = self.seen.map_or(0.0, |seen| seen.clearance);
+        check(clearance >= 0.0 && clearance.is_finite(), "bounds.seen.clearance", || {
+            format!("must be a finite depth of 0 or more, is {clearance}")
+        })?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
     }
 }

@@ -29,7 +29,7 @@ impl Cells {
     /// right, bit 1 the upper and bit 2 the nearer side.
     pub(crate) fn find(
         &mut self,
-        Seen { tiles: seen, moving }: Seen<'_>,
+        Seen { tiles: seen, moving, clearance }: Seen<'_>,
         camera: &Camera,
         boxes: &[Aabb],
     ) -> Option<impl Iterator<Item = [DVec3; 8]> + use<'_>> {
@@ -53,7 +53,7 @@ impl Cells {
         let shift = seen.camera.eye() - camera.eye();
         pyramid.open(most_seen, |tile| cells.push(tile.cell(&seen.camera).map(|p| p + shift)));
         if seen.camera != *camera {
-            motion.find_edges(seen, camera, boxes);
+            motion.find_edges(seen, camera, boxes, clearance);
             pyramid.build(motion::EDGE_TILES, motion.edges.iter().copied());
             pyramid.open(most_at_edges, |tile| cells.push(tile.cell(camera)));
         }

@@ -78,9 +78,9 @@ impl Buffers {
         moving: &[Aabb],
     ) {
         let camera = seen.camera();
-        let farthest = BEYOND * camera.far();
-        box_depths(camera, farthest, boxes, &mut self.boxes);
-        box_depths(camera, farthest, moving, &mut self.moving);
+        let limits = [camera.near(), BEYOND * camera.far()];
+        box_depths(camera, limits, boxes, &mut self.boxes);
+        box_depths(camera, limits, moving, &mut self.moving);
         let grid = [SeenTiles::ACROSS, SeenTiles::DOWN];
         let coarse = |[x, y]: [u32; 2]| (y / 2 * EDGE_TILES[0] + x / 2) as usize;
         self.is_uncovered.clear();
@@ -124,8 +124,15 @@ impl Buffers {
     }
 
     /// Finds what the new camera may see outside the earlier picture.
-    pub(super) fn find_edges(&mut self, seen: &SeenTiles, camera: &Camera, boxes: &[Aabb]) {
-        box_depths(camera, camera.far(), boxes, &mut self.boxes);
+    pub(super) fn find_edges(
+        &mut self,
+        seen: &SeenTiles,
+        camera: &Camera,
+        boxes: &[Aabb],
+        clearance: f64,
+    ) {
+        let nearest = camera.near().max(clearance);
+        box_depths(camera, [nearest, camera.far()], boxes, &mut self.boxes);
         let before = seen.camera();
         let t = camera.eye() - before.eye();
         let [lo, _, hi, _] = before.corner_slopes();
@@ -161,7 +168,8 @@ impl Buffers {
             let [from, to] = if inside[0] >= inside[1] { [f64::INFINITY, 0.0] } else { inside };
             let before = [nearest, farthest.min(from)];
             let beyond = [nearest.max(to), farthest];
-            let ranges = [before, beyond].into_iter().filter(|[near, far]| near < far);
+            // Rounding must not make a range of what ends where it begins.
+            let ranges = [before, beyond].into_iter().filter(|[near, far]| near * 1.000_001 < *far);
             let (near, far) = range(ranges.flatten());
             facing(pixels, [near, far])
         }));
@@ -210,8 +218,9 @@ fn corners([left, top, right, bottom]: [f64; 4]) -> [DVec2; 4] {
     [[left, bottom], [right, bottom], [left, top], [right, top]].map(DVec2::from)
 }
 
-/// Finds the range of depths in which boxes may be seen, for each edge tile of a camera's picture.
-fn box_depths(camera: &Camera, farthest: f64, boxes: &[Aabb], depths: &mut Vec<[f64; 2]>) {
+/// Finds the range of depths, within limits, in which boxes may be seen, for each edge tile of a
+/// camera's picture.
+fn box_depths(camera: &Camera, limits: [f64; 2], boxes: &[Aabb], depths: &mut Vec<[f64; 2]>) {
     let [across, down] = EDGE_TILES;
     depths.clear();
     depths.resize((across * down) as usize, [f64::INFINITY, f64::NEG_INFINITY]);
@@ -237,7 +246,7 @@ fn box_depths(camera: &Camera, farthest: f64, boxes: &[Aabb], depths: &mut Vec<[
             for x in count(lo.x - 1.0, width, across)..=count(hi.x + 1.0, width, across) {
                 let index = (y * across + x) as usize;
                 let pixels = tile_pixels(camera.image(), EDGE_TILES, index).map(f64::from);
-                if let Some([near, far]) = depths_within(camera, pixels, local, farthest) {
+                if let Some([near, far]) = depths_within(camera, pixels, local, limits) {
                     let depths = &mut depths[index];
                     *depths = [depths[0].min(near), depths[1].max(far)];
                 }
@@ -246,12 +255,17 @@ fn box_depths(camera: &Camera, farthest: f64, boxes: &[Aabb], depths: &mut Vec<[
     }
 }
 
-/// A range of depths that holds what a tile shows of a box (relative to the eye), metres.
-fn depths_within(camera: &Camera, pixels: [f64; 4], aabb: Aabb, farthest: f64) -> Option<[f64; 2]> {
+/// A range of depths, within limits, that holds what a tile shows of a box (relative to the eye),
+/// metres.
+fn depths_within(
+    camera: &Camera,
+    pixels: [f64; 4],
+    aabb: Aabb,
+    [mut near, mut far]: [f64; 2],
+) -> Option<[f64; 2]> {
     let rays = corners(pixels).map(|at| camera.ray(at));
     let lo = rays.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let hi = rays.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let [mut near, mut far] = [camera.near(), farthest];
     // Along each axis, a point at depth z lies between z·lo and z·hi.
     for axis in 0..3 {
         for (rate, limit) in [(lo[axis], aabb.max[axis]), (-hi[axis], -aabb.min[axis])] {

@@ -84,15 +84,19 @@ fn scene() -> impl Strategy<Value = Scene> {
 }
 
 fn camera(eye: DVec3, turn: DVec2) -> Camera {
+    camera_with(eye, turn, 1.0, IMAGE)
+}
+
+fn camera_with(eye: DVec3, turn: DVec2, fov_y_rad: f64, image: [u32; 2]) -> Camera {
     let toward = DVec3::new(turn.x, turn.y - 0.2, -1.0);
     Camera::look_at(LookAt {
         eye,
         target: eye + toward,
         up: DVec3::Y,
-        fov_y_rad: 1.0,
+        fov_y_rad,
         near: 0.1,
         far: 50.0,
-        image: IMAGE,
+        image,
     })
     .unwrap()
 }
@@ -104,19 +108,23 @@ fn cells(seen: Seen<'_>, camera: &Camera, boxes: &[Aabb]) -> Option<Vec<Vec<Plan
     let mut cells = Cells::default();
     let found: Vec<_> = cells.find(seen, camera, boxes)?.collect();
     assert!(found.len() <= 128, "{} cells", found.len());
-    Some(
-        found
-            .into_iter()
-            .map(|corners| {
-                body.set_hexahedron(corners);
-                body.planes().collect()
-            })
-            .collect(),
-    )
+    let mut cells: Vec<Vec<Plane>> = found
+        .into_iter()
+        .map(|corners| {
+            body.set_hexahedron(corners);
+            body.planes().collect()
+        })
+        .collect();
+    for moving in seen.moving {
+        body.set_hexahedron(moving.relative_to(camera.eye()).corners());
+        cells.push(body.planes().collect());
+    }
+    Some(cells)
 }
 
 fn holds(cells: &[Vec<Plane>], p: DVec3) -> bool {
-    let slack = 1e-6 * p.length();
+    // A hundredth of a pixel, by which a ball bulges out between pixels.
+    let slack = 1e-4 * p.length();
     cells.iter().any(|planes| planes.iter().all(|plane| plane.distance(p) >= -slack))
 }
 
@@ -124,7 +132,9 @@ fn holds(cells: &[Vec<Plane>], p: DVec3) -> bool {
 fn lost(scene: &Scene, camera: &Camera, cells: &[Vec<Plane>]) -> (Vec<[u32; 2]>, usize) {
     let mut lost = Vec::new();
     let mut count = 0;
-    for (x, y) in (0..IMAGE[1]).flat_map(|y| (y % 2..IMAGE[0]).step_by(2).map(move |x| (x, y))) {
+    for (x, y) in (0..camera.image()[1])
+        .flat_map(|y| (y % 2..camera.image()[0]).step_by(2).map(move |x| (x, y)))
+    {
         let (depth, _) = scene.hit(camera, center(x, y));
         if depth <= camera.far() {
             count += 1;
@@ -164,7 +174,7 @@ proptest! {
     ) {
         let camera = camera(DVec3::new(x, y, z), turn.into());
         let seen = scene.seen(&camera);
-        let seen = Seen { tiles: &seen, moving: &[] };
+        let seen = Seen { tiles: &seen, moving: &[], clearance: 0.0 };
         let cells = cells(seen, &camera, &[]).expect("a camera that stands still");
         let (lost, count) = lost(&scene, &camera, &cells);
         prop_assert!(count > 0 && lost.is_empty(), "{lost:?} of {count}");
@@ -178,17 +188,89 @@ proptest! {
         step in prop::array::uniform3(-1.0..1.0f64),
         stride in 0.0..1.0f64,
         turning in prop_oneof![Just([0.0, 0.0]), [-0.3..0.3f64, -0.2..0.2]],
+        (fov_y_rad, image) in prop_oneof![
+            3 => Just((1.0, IMAGE)),
+            1 => (0.6..1.3f64).prop_map(|fov_y_rad| (fov_y_rad, [150, 110])),
+        ],
     ) {
         let eye = DVec3::new(x, y, z);
         let before = camera(eye, turn.into());
-        let after = camera(eye + DVec3::from(step) * stride, DVec2::from(turn) + DVec2::from(turning));
+        let turn = DVec2::from(turn) + DVec2::from(turning);
+        let after = camera_with(eye + DVec3::from(step) * stride, turn, fov_y_rad, image);
         let seen = scene.seen(&before);
         let boxes = scene.boxes();
-        let seen = Seen { tiles: &seen, moving: &[] };
+        let seen = Seen { tiles: &seen, moving: &[], clearance: 0.0 };
         let Some(cells) = cells(seen, &after, &boxes) else { return Ok(()) };
         let (lost, count) = lost(&scene, &after, &cells);
         // Between two pixels the earlier picture shows nothing, so the edge of a thing may be lost.
         let inner = lost.iter().filter(|&&p| !is_at_silhouette(&scene, &after, p)).count();
         prop_assert!(inner == 0 && lost.len() * 100 <= count, "{lost:?} of {count}, {inner} inner");
+    }
+
+    /// A thing moves, and what it hid comes into view.
+    #[test]
+    fn what_moves_and_what_it_hid_are_served(
+        scene in scene(),
+        [x, y, z] in [-10.0..10.0f64, 0.3..6.0, 1.0..12.0],
+        turn in [-1.0..1.0f64, -0.6..0.4],
+        shift in [-3.0..3.0f64, 0.0..2.0, -3.0..3.0],
+        step in prop_oneof![Just([0.0; 3]), prop::array::uniform3(-0.2..0.2f64)],
+    ) {
+        let eye = DVec3::new(x, y, z);
+        let before = camera(eye, turn.into());
+        let after = camera(eye + DVec3::from(step), turn.into());
+        let seen = scene.seen(&before);
+        let mut later = scene.clone();
+        let thing = &mut later.things[1].0;
+        let old = *thing;
+        *thing = Aabb { min: old.min + DVec3::from(shift), max: old.max + DVec3::from(shift) };
+        let moving = [old.union(*thing)];
+        let boxes = later.boxes();
+        let seen = Seen { tiles: &seen, moving: &moving, clearance: 0.0 };
+        let Some(cells) = cells(seen, &after, &boxes) else { return Ok(()) };
+        let (lost, count) = lost(&later, &after, &cells);
+        let inner = lost.iter().filter(|&&p| !is_at_silhouette(&later, &after, p)).count();
+        prop_assert!(inner == 0 && lost.len() * 100 <= count, "{lost:?} of {count}, {inner} inner");
+    }
+}
+
+/// A camera that may have come through what it saw is not served by it.
+#[test]
+fn a_camera_that_went_too_far_is_served_by_boxes() {
+    let scene =
+        Scene { things: vec![(Aabb::new(DVec3::splat(-1.0), DVec3::new(1.0, 3.0, 1.0)), false)] };
+    let before = camera(DVec3::new(0.0, 1.0, 5.0), DVec2::ZERO);
+    let seen = scene.seen(&before);
+    let seen = Seen { tiles: &seen, moving: &[], clearance: 0.0 };
+    let boxes = scene.boxes();
+    let at = |z: f64| cells(seen, &camera(DVec3::new(0.0, 1.0, z), DVec2::ZERO), &boxes);
+    assert!(at(4.0).is_some() && at(2.0).is_none());
+}
+
+#[test]
+fn bad_tiles_and_depths_are_named() {
+    let camera = camera(DVec3::Y, DVec2::ZERO);
+    let good = super::SeenTile {
+        pixels: [0.0, 0.0, 5.0, 5.0],
+        slope: DVec2::ZERO,
+        inverse: [0.1, 0.2],
+        jump: 0.0,
+    };
+    let mut seen = SeenTiles::new(&camera);
+    assert_eq!(seen.set(&camera, |_| Some(good)), Ok(()));
+    for bad in [
+        super::SeenTile { inverse: [0.2, 0.1], ..good },
+        super::SeenTile { inverse: [0.1, f64::INFINITY], ..good },
+        super::SeenTile { slope: DVec2::NAN, ..good },
+        super::SeenTile { pixels: [5.0, 0.0, 0.0, 5.0], ..good },
+        super::SeenTile { jump: f64::NAN, ..good },
+    ] {
+        let error = seen.set(&camera, |index| (index > 9).then_some(bad)).unwrap_err();
+        assert!(error.to_string().starts_with("seen.tiles: "), "{error}");
+        assert!(seen.tiles().iter().all(Option::is_none));
+    }
+    for depth in [0.0, -1.0, f64::NAN] {
+        let error = SeenTiles::of_depths(&camera, |_, _| depth).unwrap_err();
+        assert!(error.to_string().starts_with("seen.depth: "), "{error}");
     }
 }
