@@ -156,7 +156,7 @@ fn casters_keep_their_depths_if_asked() {
     let bounds = Bounds {
         receivers: Some(Aabb::new(DVec3::new(-50.0, 0.0, -60.0), DVec3::new(50.0, 1.0, 10.0))),
         casters: Some(Aabb::new(DVec3::new(-80.0, 0.0, -90.0), DVec3::new(80.0, 40.0, 40.0))),
-        receiver_parts: &[],
+        ..Bounds::default()
     };
     let spot = |height: f64| {
         Light::Spot(SpotLight {

@@ -110,7 +110,9 @@ fn every_other_module_is_valid() {
         validated(&caster(3, &support));
     }
     validated(include_str!("clear.wesl"));
-    [false, true].map(|is_multisampled| validated(&seen(is_multisampled)));
+    for is_multisampled in [false, true] {
+        validated(&seen(is_multisampled));
+    }
 }
 
 #[test]

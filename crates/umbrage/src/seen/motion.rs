@@ -201,7 +201,7 @@ fn reach(camera: &Camera, motion: &Motion, tile: &SeenTile, place: [u32; 2]) -> 
     };
     let gap = if is_at_edge { nearest } else { tile.jump };
     // Silhouettes are known to a pixel.
-    (pixels * gap >= SeenTiles::LEAST_GAP).then(|| pixels * nearest + 1.0)
+    (pixels * gap >= SeenTiles::LEAST_GAP).then_some(pixels * nearest + 1.0)
 }
 
 /// A tile between two depths, metres; `None` if the first is not the lesser.
