@@ -66,6 +66,8 @@ struct TimesJson {
     shade: Option<Spread>,
     /// `shade` of the same backend without shadows, in the same turns.
     shade_none: Option<Spread>,
+    /// Until what was seen is back from the GPU; `null` without `--fit seen`.
+    seen: Option<Spread>,
     frame: Option<Spread>,
 }
 
@@ -130,10 +132,12 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let tracer = render_scene.tracer();
     let view = umbrage_trace::View::new(tracer, camera, chosen_light.light, 1)?;
     let receivers = Receivers::new(&scene, tracer, args.techniques.fit.into());
-    let bounds = receivers.bounds();
+    let seen = render_scene.seen(&receivers, &camera)?;
+    let bounds = receivers.bounds(seen.as_ref());
     tell_notices(&scene);
     announce(&executors);
-    let contender = |technique| Contender::new(&render_scene, technique, camera.image());
+    let contender =
+        |technique| Contender::new(&render_scene, technique, &receivers, camera.image());
     let mut contenders = techniques.iter().map(contender).collect::<Result<Vec<_>>>()?;
     let without_shadows = WITHOUT_SHADOWS.map(str::parse::<NamedTechnique>);
     for technique in &without_shadows {
@@ -207,9 +211,10 @@ impl<'a> Contender<'a> {
     fn new(
         scene: &'a RenderScene<'_>,
         technique: &'a NamedTechnique,
+        receivers: &Receivers,
         size: [u32; 2],
     ) -> Result<Self> {
-        let bencher = Bencher::new(scene, technique.technique(), size)?;
+        let bencher = Bencher::new(scene, technique.technique(), receivers, size)?;
         Ok(Self { technique, bencher, planner: planner(), frames: Vec::new() })
     }
 
@@ -261,6 +266,7 @@ impl<'a> Contender<'a> {
                 filter: self.spread(|f| f.costs.filter),
                 shade: self.spread(|f| Some(f.costs.shade)),
                 shade_none: none.spread(|f| Some(f.costs.shade)),
+                seen: self.spread(|f| f.costs.seen),
                 frame: self.spread(|f| Some(f.frame)),
             },
             // Frames of the same turn are compared, as both see what else the machine does then.
@@ -300,6 +306,7 @@ fn table(bench: &BenchJson) -> String {
         "filter",
         "shade",
         "cost",
+        "seen",
         "frame",
         "first frame",
         "maps",
@@ -322,6 +329,7 @@ fn table(bench: &BenchJson) -> String {
             ms(r.ms.filter, 2),
             ms(r.ms.shade, 2),
             ms(r.cost, 2),
+            ms(r.ms.seen, 2),
             ms(r.ms.frame, 2),
             format!("{:.2}", r.first_ms.frame),
             r.maps.to_string(),

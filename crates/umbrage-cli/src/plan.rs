@@ -137,11 +137,18 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     }
     let receivers = scene.as_ref().map(|scene| match args.fit {
         // This is the only command that can work without a ray tracer.
-        Fit::Box => Ok(Receivers::in_box(scene)),
-        fit => Ok::<_, Error>(Receivers::new(scene, &Tracer::new(scene)?, fit.into())),
+        Fit::Box => Ok((Receivers::in_box(scene), None)),
+        fit => {
+            let tracer = Tracer::new(scene)?;
+            let receivers = Receivers::new(scene, &tracer, fit.into());
+            let seen = receivers.seen(&tracer, &view.camera)?;
+            Ok::<_, Error>((receivers, seen))
+        }
     });
     let receivers = receivers.transpose()?;
-    let bounds = receivers.as_ref().map_or_else(Bounds::default, Receivers::bounds);
+    let bounds = receivers
+        .as_ref()
+        .map_or_else(Bounds::default, |(receivers, seen)| receivers.bounds(seen.as_ref()));
     let technique = &args.shadows;
     let lights: Vec<Light> = chosen.iter().map(|l| l.light).collect();
     let mut planner = planner();

@@ -52,7 +52,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
-    let bounds = receivers.bounds();
+    let seen = render_scene.seen(&receivers, &chosen.camera)?;
+    let bounds = receivers.bounds(seen.as_ref());
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(args.aov);
     if needs.motion {
@@ -71,8 +72,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let bar = Bar::new(map_rows + height * needs.passes(), quiet);
     let mut picture = Picture::trace(args, needs, &render_scene, &view, &plan, &bar)?;
     if needs.motion {
-        let (scene, bounds, look_at) = (&render_scene, &bounds, chosen.look_at);
-        let moving = MovingView { scene, bounds, look_at, light, samples: 1 };
+        let (scene, receivers, look_at) = (&render_scene, &receivers, chosen.look_at);
+        let moving = MovingView { scene, receivers, look_at, light, samples: 1 };
         let techniques = std::slice::from_ref(&args.shadows);
         let noise = noise(Motion::Away, FRAMES, &moving, techniques, &bar)?.swap_remove(0);
         picture.noise = noise.pixels;

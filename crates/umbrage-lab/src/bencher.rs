@@ -3,12 +3,13 @@
 use crate::error::{About, Error, Field};
 use crate::executor::{Executor, OnGpu, RenderScene, Work};
 use crate::planning::milliseconds;
+use crate::receivers::Receivers;
 use crate::strip::Rows;
 use std::time::Instant;
 use umbrage::{Plan, Technique};
 use umbrage_render::{Drawn, FrameTarget, Shading, Timer};
 use umbrage_trace::{Reference, Tracer, View};
-use umbrage_wgpu::Casters;
+use umbrage_wgpu::{Casters, SeenReadback};
 
 /// The costs of a frame, with times in milliseconds.
 #[derive(Clone, Debug)]
@@ -21,6 +22,9 @@ pub struct Costs {
     pub filter: Option<f64>,
     /// Time to draw the picture.
     pub shade: f64,
+    /// Time until what was [seen](crate::Fit::Seen) is back from the GPU, which renderers need not
+    /// wait for; `None` if the maps are not fitted to that, or for the CPU reference.
+    pub seen: Option<f64>,
     /// What was drawn into which map, by the map's index in the plan; `None` for the CPU reference.
     pub drawn: Option<Vec<(usize, Drawn)>>,
 }
@@ -30,6 +34,8 @@ pub struct Bencher<'a> {
     executor: Executor<'a>,
     /// Target that the GPU draws into, and a timer if the GPU has timestamps.
     target: Option<(FrameTarget, Option<Timer>)>,
+    /// What reduces the frames' depths, if a GPU's maps are fitted to what is seen.
+    readback: Option<SeenReadback>,
 }
 
 impl<'a> Bencher<'a> {
@@ -40,6 +46,7 @@ impl<'a> Bencher<'a> {
     pub fn new(
         scene: &'a RenderScene<'_>,
         technique: &Technique,
+        receivers: &Receivers,
         size: [u32; 2],
     ) -> Result<Self, Error> {
         let executor = scene.executor(technique)?;
@@ -49,7 +56,14 @@ impl<'a> Bencher<'a> {
             }
             Work::Reference { .. } => None,
         };
-        Ok(Self { executor, target })
+        let readback = match &executor.work {
+            Work::Gpu(on) if receivers.are_seen() && on.gpu.support().compute => {
+                let readback = SeenReadback::new(on.gpu.device(), &on.gpu.support());
+                Some(readback.map_err(umbrage_render::Error::from)?)
+            }
+            _ => None,
+        };
+        Ok(Self { executor, target, readback })
     }
 
     /// Returns the executor that draws.
@@ -71,7 +85,11 @@ impl<'a> Bencher<'a> {
         match (&mut self.executor.work, &self.target) {
             (Work::Gpu(on), Some((target, timer))) => {
                 let casters = if still { Casters::Unmoved } else { Casters::Moved };
-                frame_on_gpu(on, target, timer.as_ref(), view, plan, casters)
+                let costs = frame_on_gpu(on, target, timer.as_ref(), view, plan, casters)?;
+                let Some(readback) = &mut self.readback else { return Ok(costs) };
+                let start = Instant::now();
+                on.renderer.seen(view.camera(), target, readback)?;
+                Ok(Costs { seen: Some(milliseconds(start)), ..costs })
             }
             (Work::Reference { tracer, .. }, _) => frame_by_reference(tracer, view, plan),
             (Work::Gpu(_), None) => unreachable!("a GPU was given a target"),
@@ -109,7 +127,7 @@ fn frame_on_gpu(
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
-    Ok(Costs { bytes, depth, filter, shade, drawn: Some(drawn) })
+    Ok(Costs { bytes, depth, filter, shade, seen: None, drawn: Some(drawn) })
 }
 
 fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Result<Costs, Error> {
@@ -121,5 +139,5 @@ fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Resu
         Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
     }
     let bytes = reference.bytes();
-    Ok(Costs { bytes, depth, filter: None, shade: milliseconds(shaded), drawn: None })
+    Ok(Costs { bytes, depth, filter: None, shade: milliseconds(shaded), seen: None, drawn: None })
 }

@@ -96,7 +96,8 @@ impl<'a> Comparison<'a> {
         let (camera, light) = (chosen_view.camera, chosen_light.light);
         let view = View::new(prepared.render.tracer(), camera, light, options.samples)
             .about(Field::Samples)?;
-        let bounds = prepared.receivers.bounds();
+        let seen = prepared.render.seen(&prepared.receivers, &camera)?;
+        let bounds = prepared.receivers.bounds(seen.as_ref());
         let plan = |t| planning::timed_plan(t, &camera, &light, &bounds);
         let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;
         Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
@@ -179,7 +180,7 @@ impl Compared<'_> {
         let Comparison { prepared, options, chosen_view, chosen_light, .. } = self.comparison;
         let moving = MovingView {
             scene: &prepared.render,
-            bounds: &prepared.receivers.bounds(),
+            receivers: &prepared.receivers,
             look_at: chosen_view.look_at,
             light: chosen_light.light,
             samples: options.samples,

@@ -1,14 +1,16 @@
 //! Executors, which render shadow maps and look them up: a GPU, or the reference on the CPU.
 
-use crate::error::{About, Error};
+use crate::error::{About, Error, Field};
 use crate::executors::{Executors, GPU, REFERENCE, runs_on_gpu};
+use crate::receivers::Receivers;
 use crate::strip::{Rows, Strip};
+use glam::DVec3;
 use rayon::prelude::*;
-use umbrage::{Plan, Technique};
-use umbrage_render::{Gpu, Renderer, SceneBuffers, Shading, Timer};
+use umbrage::{Camera, Light, Plan, SeenTiles, Technique};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer};
-use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
+use umbrage_wgpu::{Casters, LookupBuffers, SeenReadback, ShadowOptions};
 
 /// A scene that is ready to be rendered, by rays on the CPU and, if there is one, on a GPU.
 pub struct RenderScene<'a> {
@@ -33,6 +35,28 @@ impl<'a> RenderScene<'a> {
     /// Returns the scene in the form that rays are traced in.
     pub fn tracer(&self) -> &Tracer<'a> {
         &self.tracer
+    }
+
+    /// Returns what a camera sees, if the maps are fitted to that. A GPU draws the picture and
+    /// reduces its depths; without one, rays find them.
+    ///
+    /// # Errors
+    /// An error if a GPU fails.
+    pub fn seen(&self, receivers: &Receivers, camera: &Camera) -> Result<Option<SeenTiles>, Error> {
+        match &self.gpu {
+            Some((gpu, buffers)) if receivers.are_seen() && gpu.support().compute => {
+                let mut readback = SeenReadback::new(gpu.device(), &gpu.support())
+                    .map_err(umbrage_render::Error::from)?;
+                let mut renderer = Renderer::new(gpu, buffers, &ShadowOptions::default())?;
+                let target = FrameTarget::new(gpu, camera.image()).about(Field::Size)?;
+                // The light does not matter for depths.
+                let light = Light::Directional { direction: DVec3::NEG_Y };
+                let shading = Shading { camera, light: &light, light_index: 0 };
+                renderer.frame(&shading, &target, None)?;
+                Ok(renderer.seen(camera, &target, &mut readback)?)
+            }
+            _ => receivers.seen(&self.tracer, camera),
+        }
     }
 
     /// Returns the number of rows that rendering a technique's plan will report.

@@ -1,8 +1,11 @@
 //! Receivers: the places where shadows can fall.
 
-use umbrage::{Aabb, Bounds, BoxTree};
+use crate::error::Error;
+use glam::DVec2;
+use rayon::prelude::*;
+use umbrage::{Aabb, Bounds, BoxTree, Camera, Seen, SeenTiles};
 use umbrage_scene::Scene;
-use umbrage_trace::Tracer;
+use umbrage_trace::{Ray, Tracer};
 
 /// What shadow maps are fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,14 +14,17 @@ pub enum Fit {
     Box,
     /// Up to some hundred boxes around the scene's surfaces.
     Surfaces,
+    /// What each pixel of the picture shows.
+    Seen,
 }
 
 impl Fit {
-    /// Returns `box` or `surfaces`.
+    /// Returns `box`, `surfaces` or `seen`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Box => "box",
             Self::Surfaces => "surfaces",
+            Self::Seen => "seen",
         }
     }
 }
@@ -27,6 +33,7 @@ impl Fit {
 pub struct Receivers {
     all: Aabb,
     parts: Option<BoxTree>,
+    fit: Fit,
 }
 
 /// Largest number of boxes around surfaces. More make planning slower and the maps hardly finer.
@@ -35,22 +42,51 @@ const SURFACE_BOXES: usize = 256;
 impl Receivers {
     /// Returns the receivers that `fit` selects. Boxes around surfaces come from the tracer's tree.
     pub fn new(scene: &Scene, tracer: &Tracer<'_>, fit: Fit) -> Self {
-        match fit {
-            Fit::Box => Self::in_box(scene),
-            Fit::Surfaces => {
-                let parts = BoxTree::new(&tracer.boxes(SURFACE_BOXES)).ok();
-                Self { parts, ..Self::in_box(scene) }
-            }
-        }
+        let parts = match fit {
+            Fit::Box => None,
+            Fit::Surfaces | Fit::Seen => BoxTree::new(&tracer.boxes(SURFACE_BOXES)).ok(),
+        };
+        Self { parts, fit, ..Self::in_box(scene) }
     }
 
     /// Returns the bounding box of the scene as the only receiver. This needs no tracer.
     pub fn in_box(scene: &Scene) -> Self {
-        Self { all: scene.bounds(), parts: None }
+        Self { all: scene.bounds(), parts: None, fit: Fit::Box }
     }
 
-    /// Returns the receivers as bounds for the planner.
-    pub fn bounds(&self) -> Bounds<'_> {
-        Bounds { receiver_parts: self.parts.as_ref(), ..Bounds::of_scene(self.all) }
+    /// Returns whether the maps are fitted to what is seen.
+    pub(crate) fn are_seen(&self) -> bool {
+        self.fit == Fit::Seen
+    }
+
+    /// Returns what a camera sees at its pixels' centres, found by rays, if the maps are fitted to
+    /// that.
+    ///
+    /// # Errors
+    /// None in practice: rays find no depths that are not positive.
+    pub fn seen(&self, tracer: &Tracer<'_>, camera: &Camera) -> Result<Option<SeenTiles>, Error> {
+        if !self.are_seen() {
+            return Ok(None);
+        }
+        let [width, height] = camera.image();
+        let depth = |x: u32, y: u32| {
+            let direction = camera.ray(DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+            let ray = Ray { origin: camera.eye(), direction };
+            // The ray's direction has depth 1, so its parameter t is the depth.
+            tracer.closest(ray, [camera.near(), f64::INFINITY]).map_or(f64::INFINITY, |hit| hit.t)
+        };
+        let depths: Vec<f64> = (0..height)
+            .into_par_iter()
+            .flat_map_iter(|y| (0..width).map(move |x| depth(x, y)))
+            .collect();
+        let depth = |x, y| depths[(y * width + x) as usize];
+        SeenTiles::of_depths(camera, depth).map(Some).map_err(Error::Planning)
+    }
+
+    /// Returns the receivers as bounds for the planner, together with what was
+    /// [seen](Self::seen).
+    pub fn bounds<'a>(&'a self, seen: Option<&'a SeenTiles>) -> Bounds<'a> {
+        let seen = seen.map(|tiles| Seen { tiles, moving: &[], clearance: 0.0 });
+        Bounds { receiver_parts: self.parts.as_ref(), seen, ..Bounds::of_scene(self.all) }
     }
 }

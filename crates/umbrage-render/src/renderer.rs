@@ -7,10 +7,10 @@ use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::mem::{offset_of, size_of};
-use umbrage::{Camera, Light, Plan};
+use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
-    CasterInstance, Casters, DEPTH_FORMAT, Frame, Mask, MeshCasters, MeshKind, ShadowOptions,
-    Shadows, Support,
+    CasterInstance, Casters, DEPTH_FORMAT, DepthProjection, Frame, Mask, MeshCasters, MeshKind,
+    SeenReadback, ShadowOptions, Shadows, Support,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
@@ -269,7 +269,9 @@ impl<'g, 's> Renderer<'g, 's> {
         let pipelines = self.pipelines("frame", &[FRAME_FORMAT]);
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
         let FrameTarget { color_view, depth, .. } = target;
-        let target = Target { color: &[color_view], depth, pipelines: &pipelines };
+        let color = &[color_view][..];
+        let depth_store = StoreOp::Store;
+        let target = Target { color, depth, depth_store, pipelines: &pipelines };
         let drawn = self.encode_picture(&mut encoder, shading, &tile, &target, timer)?;
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
@@ -277,6 +279,27 @@ impl<'g, 's> Renderer<'g, 's> {
         self.gpu.queue().submit([encoder.finish()]);
         self.gpu.check()?;
         Ok(drawn)
+    }
+
+    /// Reduces the depths of the frame that was drawn last into a target, and waits for what it
+    /// shows.
+    ///
+    /// # Errors
+    /// The device refused something or was lost.
+    pub fn seen(
+        &self,
+        camera: &Camera,
+        target: &FrameTarget,
+        readback: &mut SeenReadback,
+    ) -> Result<Option<SeenTiles>, Error> {
+        let (device, queue) = (self.gpu.device(), self.gpu.queue());
+        // Depth is reversed and the far plane infinitely far.
+        let projection = DepthProjection::of_range(camera.near(), f64::INFINITY, true)?;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        readback.encode(device, queue, &mut encoder, &target.depth, projection, camera)?;
+        queue.submit([encoder.finish()]);
+        self.gpu.wait()?;
+        Ok(readback.latest(device).cloned())
     }
 
     /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
@@ -316,7 +339,7 @@ impl<'g, 's> Renderer<'g, 's> {
             color_attachments: &attachments,
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
                 view: target.depth,
-                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
+                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: target.depth_store }),
                 stencil_ops: None,
             }),
             timestamp_writes: timer.map(Timer::shade_pass),
@@ -410,7 +433,7 @@ impl FrameTarget {
         };
         let color = texture(FRAME_FORMAT, TextureUsages::COPY_SRC);
         let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
-        let depth = view(&texture(DEPTH_FORMAT, TextureUsages::empty()));
+        let depth = view(&texture(DEPTH_FORMAT, TextureUsages::TEXTURE_BINDING));
         gpu.check()?;
         Ok(Self { color_view: view(&color), color, depth })
     }
@@ -425,6 +448,8 @@ impl FrameTarget {
 pub(crate) struct Target<'a> {
     pub(crate) color: &'a [&'a TextureView],
     pub(crate) depth: &'a TextureView,
+    /// Whether depths are kept for later passes.
+    pub(crate) depth_store: StoreOp,
     pub(crate) pipelines: &'a Pipelines,
 }
 

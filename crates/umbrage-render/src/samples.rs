@@ -8,8 +8,8 @@ use std::ops::Range;
 use umbrage_wgpu::DEPTH_FORMAT;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Extent3d,
-    TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension,
-    TextureFormat, TextureUsages, TextureViewDescriptor,
+    StoreOp, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor,
+    TextureDimension, TextureFormat, TextureUsages, TextureViewDescriptor,
 };
 
 /// The values of the GPU at a point of a picture.
@@ -152,12 +152,14 @@ impl Layers {
         let device = renderer.gpu.device();
         let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
         let mut encoder = device.create_command_encoder(&Default::default());
-        let target = Target { color: &[&first, &second], depth: &depth, pipelines: picture };
+        let depth_store = StoreOp::Discard;
+        let target =
+            Target { color: &[&first, &second], depth: &depth, depth_store, pipelines: picture };
         renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
         self.copy(&mut encoder, 0, 0);
         self.copy(&mut encoder, 1, 1);
         if let Some(texels) = texels {
-            let target = Target { color: &[&first], depth: &depth, pipelines: texels };
+            let target = Target { color: &[&first], depth: &depth, depth_store, pipelines: texels };
             renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
             self.copy(&mut encoder, 0, 2);
         }

@@ -94,7 +94,8 @@ fn planning(criterion: &mut Criterion) {
             image: [960, 540],
         });
         let camera = camera.expect("a valid camera");
-        let parts = (!case.parts.is_empty()).then(|| BoxTree::new(&case.parts).expect("sound boxes"));
+        let parts =
+            (!case.parts.is_empty()).then(|| BoxTree::new(&case.parts).expect("sound boxes"));
         let bounds = Bounds { receiver_parts: parts.as_ref(), ..Bounds::of_scene(case.all) };
         let mut group = criterion.benchmark_group(&case.name);
         group.sample_size(10).warm_up_time(Duration::from_millis(500));

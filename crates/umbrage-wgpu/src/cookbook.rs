@@ -10,6 +10,7 @@
 //! | to change the technique or its filter at run time | [`filter_at_run_time`] |
 //! | to see which map serves a point, and the map itself | [`show_a_map`] |
 //! | a filter for the sun and another for lamps | [`filters_per_light`] |
+//! | maps fitted to what the camera sees | [`fit_to_seen`] |
 //! | to follow the size of a window | [`resizing`] |
 //!
 //! # Hidden fragments
@@ -127,3 +128,13 @@ pub mod filters_per_light {}
 #[doc = include_str!("../cookbook/resizing.rs")]
 #[doc = "```"]
 pub mod resizing {}
+
+/// Where walls hide most of the scene, maps fitted to what is seen have several times less error
+/// than maps fitted to boxes. The depths of a frame come back one or two frames later, without
+/// waiting. What the camera has come to see since then is taken from the boxes:
+/// [`SeenTiles`](umbrage::SeenTiles) says what is guaranteed.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/fit_to_seen.rs")]
+#[doc = "```"]
+pub mod fit_to_seen {}

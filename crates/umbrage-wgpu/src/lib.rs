@@ -12,6 +12,8 @@
 //!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states,
 //!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the
 //!   fragment stage that the device needs.
+//! - [`SeenReadback`] reduces the viewer's depth buffer to what the camera sees, for the planner to
+//!   fit the maps of a later frame to.
 //! - The [`cookbook`] has recipes: casters and shading of your own, several cameras, and others.
 //! - [`Support`] says what a device can do, and documents what takes the place of what it cannot
 //!   do.
@@ -66,6 +68,7 @@ mod error;
 mod passes;
 mod prefilter;
 mod redraw;
+mod seen;
 mod shadows;
 mod slots;
 mod support;
@@ -75,6 +78,7 @@ pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
 pub use redraw::Redraw;
+pub use seen::{DepthProjection, SeenReadback};
 pub use shadows::{
     Bias, Casters, Comparison, DEPTH_FORMAT, Frame, Layout, LookupBuffers, ShadowOptions, Shadows,
 };

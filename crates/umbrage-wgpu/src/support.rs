@@ -18,6 +18,8 @@ use wgpu::{
 ///   multiple of 6 are needed;
 /// - interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures, the prefilters
 ///   that store their statistics in such textures are [`Error::Unsupported`];
+/// - compute shaders, or fetching depths, [`SeenReadback`](crate::SeenReadback) is
+///   [`Error::Unsupported`];
 /// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
 ///
 /// Fields are public so that you can force a fallback by setting a field to `false`.
@@ -29,6 +31,9 @@ pub struct Support {
     pub storage_buffers: bool,
     /// Whether shaders can fetch single depths.
     pub depth_fetch: bool,
+    /// Whether there are compute shaders, with which [`SeenReadback`](crate::SeenReadback) reduces
+    /// depths.
+    pub compute: bool,
     /// Whether textures of 32-bit floats can be interpolated, as `vsm`, `esm` and `evsm` need.
     pub float32: bool,
     /// Whether 16-bit normalised textures can be drawn into and interpolated, as `msm` and the
@@ -119,6 +124,9 @@ impl Support {
             depth_clip_control: features.contains(Features::DEPTH_CLIP_CONTROL),
             storage_buffers,
             depth_fetch,
+            compute: flags.contains(DownlevelFlags::COMPUTE_SHADERS)
+                && limits.max_compute_invocations_per_workgroup >= 64
+                && limits.max_storage_buffers_per_shader_stage >= 1,
             float32: features.contains(Features::FLOAT32_FILTERABLE),
             norm16: features.contains(Features::TEXTURE_FORMAT_16BIT_NORM),
             // Drawing into this format is not guaranteed on every device; only an adapter can tell.
@@ -143,6 +151,7 @@ impl Support {
         depth_clip_control: true,
         storage_buffers: true,
         depth_fetch: true,
+        compute: true,
         float32: true,
         norm16: true,
         snorm8: true,
@@ -175,7 +184,8 @@ mod tests {
         let flags = DownlevelFlags::compliant();
         let of = |features| Support::of(features, &Limits::default(), flags, Backend::Vulkan);
         let plain = of(Features::empty()).unwrap();
-        assert!(plain.storage_buffers && plain.depth_fetch && !plain.depth_clip_control);
+        assert!(plain.storage_buffers && plain.depth_fetch && plain.compute);
+        assert!(!plain.depth_clip_control);
         assert!(of(Support::WANTED_FEATURES).unwrap().depth_clip_control);
         assert_eq!([plain.max_side, plain.max_layers], [8192, 256]);
     }
@@ -184,7 +194,7 @@ mod tests {
     fn a_webgl2_class_device_falls_back() {
         let limits = Limits::downlevel_webgl2_defaults();
         let support = Support::of(Features::empty(), &limits, webgl2(), Backend::Gl).unwrap();
-        assert!(!support.storage_buffers && !support.depth_fetch);
+        assert!(!support.storage_buffers && !support.depth_fetch && !support.compute);
         assert_eq!(support.max_side, 2048);
         assert_eq!([0, 1, 2, 5, 6, 12].map(|n| support.array_layers(n)), [2, 2, 2, 5, 7, 13]);
     }

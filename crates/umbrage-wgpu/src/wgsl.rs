@@ -411,6 +411,21 @@ fn mesh_shader(support: &Support, is_masked: bool) -> Shader {
     shader
 }
 
+/// The text of the pass that reduces the viewer's depths to tiles.
+pub(crate) fn seen(is_multisampled: bool) -> String {
+    seen_shader(is_multisampled).link()
+}
+
+fn seen_shader(is_multisampled: bool) -> Shader {
+    let mut shader = Shader::new(module!("seen"));
+    shader.add([if is_multisampled {
+        module!("depths/multisampled")
+    } else {
+        module!("depths/single")
+    }]);
+    shader
+}
+
 fn add_caster_constants(shader: &mut Shader, group: u32, support: &Support) {
     shader.constant("SHADOW_CASTER_GROUP", group);
     shader.constant("SHADOW_DEVICE_CLAMPS", support.depth_clip_control);

@@ -1,5 +1,6 @@
 use crate::box_tree::BoxTree;
 use crate::error::{Error, check, check_position};
+use crate::seen::Seen;
 use glam::DVec3;
 
 /// An axis-aligned box in world space, metres.
@@ -100,6 +101,9 @@ pub struct Bounds<'a> {
     /// boxes: of those that the camera sees, it serves
     /// [at most 32 groups](crate::Planner::MOST_PARTS) apart.
     pub receiver_parts: Option<&'a BoxTree>,
+    /// What the camera saw in this frame or a frame or two before. Maps are then fitted to that in
+    /// place of the boxes, which are still needed for what has come into view since.
+    pub seen: Option<Seen<'a>>,
     /// A box around everything that casts shadows. `None` if unknown; then casters may lie anywhere
     /// towards the light. Only maps with [`Cover::Scene`](crate::Cover::Scene) and maps that [keep
     /// their casters' depths](crate::visibility::Filter::keeps_casters) have to include the casters
@@ -111,11 +115,17 @@ pub struct Bounds<'a> {
 impl Bounds<'_> {
     /// Bounds of one box that contains both receivers and casters.
     pub fn of_scene(scene: Aabb) -> Self {
-        Self { receivers: Some(scene), receiver_parts: None, casters: Some(scene) }
+        Self { receivers: Some(scene), receiver_parts: None, seen: None, casters: Some(scene) }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.receivers.map_or(Ok(()), |b| b.check("bounds.receivers"))?;
+        let moving = self.seen.map_or(&[][..], |seen| seen.moving);
+        moving.iter().try_for_each(|b| b.check("bounds.seen.moving"))?;
+        let clearance = self.seen.map_or(0.0, |seen| seen.clearance);
+        check(clearance >= 0.0 && clearance.is_finite(), "bounds.seen.clearance", || {
+            format!("must be a finite depth of 0 or more, is {clearance}")
+        })?;
         self.casters.map_or(Ok(()), |b| b.check("bounds.casters"))
     }
 }

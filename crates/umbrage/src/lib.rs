@@ -47,6 +47,7 @@ mod partition;
 mod plan;
 mod planner;
 mod resolution;
+mod seen;
 mod slab;
 mod stable;
 mod technique;
@@ -65,6 +66,7 @@ pub use plan::{
     Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
 };
 pub use planner::Planner;
+pub use seen::{Seen, SeenTile, SeenTiles};
 pub use technique::language;
 pub use technique::{Cover, Faces, Limits, Objective, Partition, Size, Splits, Technique, Warp};
 

@@ -6,6 +6,7 @@ use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Part, Plan, PlannedLight};
 use crate::resolution::resolutions;
+use crate::seen::cells::Cells;
 use crate::technique::{Faces, Limits, Technique};
 use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
@@ -69,6 +70,7 @@ pub struct Planner {
     sizes: Vec<[u32; 2]>,
     bodies: Bodies,
     opening: Opening,
+    cells: Cells,
     /// Planes around everything that the camera sees.
     around: Vec<Plane>,
     /// Planes around the part of a light's view that a face of the frustum serves.
@@ -181,18 +183,41 @@ impl Planner {
             }
             view.clip(&sides);
         }
+        let seen_bounds = view.bounds();
         if let Some(tree) = bounds.receiver_parts {
-            let seen = view.bounds();
-            self.opening.choose(tree, camera, &self.around, seen, Self::MOST_PARTS);
-            let size = view.size();
-            view.clear();
-            for aabb in self.opening.boxes() {
-                let aabb = thickened(aabb, size);
-                self.cell.clear();
-                self.cell.extend(self.around.iter().filter(|p| !p.contains(aabb)));
+            self.opening.choose(tree, camera, &self.around, seen_bounds, Self::MOST_PARTS);
+        }
+        let one_box = bounds.receivers.as_slice();
+        let boxes = if bounds.receiver_parts.is_some() { self.opening.boxes() } else { one_box };
+        let cells = bounds.seen.and_then(|seen| self.cells.find(seen, camera, boxes));
+        let boxes = match (&cells, bounds.seen) {
+            (Some(_), Some(seen)) => seen.moving,
+            _ if bounds.receiver_parts.is_some() => boxes,
+            _ => return,
+        };
+        let size = view.size();
+        view.clear();
+        let mut add = |part: &mut Body, is_inside: &dyn Fn(&Plane) -> bool| {
+            self.cell.clear();
+            self.cell.extend(self.around.iter().filter(|p| !is_inside(p)));
+            view.append_clipped(part, &self.cell);
+        };
+        for corners in cells.into_iter().flatten() {
+            let is_hidden = |p: &Plane| corners.iter().all(|&c| p.distance(c) < 0.0);
+            if !self.around.iter().any(is_hidden) {
+                part.clear();
+                part.push_hexahedron(corners);
+                add(part, &|p| corners.iter().all(|&c| p.distance(c) >= 0.0));
+            }
+        }
+        for &aabb in boxes {
+            // Vertices cut out of a vast box would lose as many digits as the box's size takes up,
+            // so the box is first intersected with what is seen.
+            let aabb = thickened(local(aabb).intersection(seen_bounds), size);
+            if !aabb.is_empty() && self.around.iter().all(|p| p.may_touch(aabb)) {
                 part.clear();
                 part.push_box(aabb);
-                view.append_clipped(part, &self.cell);
+                add(part, &|p| p.contains(aabb));
             }
         }
     }

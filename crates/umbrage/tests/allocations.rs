@@ -6,8 +6,8 @@ use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use umbrage::{
-    Aabb, Bounds, Camera, Faces, Light, LookAt, Partition, Planner, PointLight, Splits, SpotLight,
-    Technique,
+    Aabb, Bounds, Camera, Faces, Light, LookAt, Partition, Planner, PointLight, Seen, SeenTiles,
+    Splits, SpotLight, Technique,
 };
 
 struct Counting;
@@ -102,4 +102,23 @@ fn steady_frames_do_not_allocate() {
         let after = ALLOCATIONS.with(Cell::get);
         assert_eq!(after, before, "{technique:?}, {} lights", lights.len());
     }
+
+    // The camera of each frame sees by the tiles of the frame before, which are set anew as well.
+    let depths = |x: u32, y: u32| if x % 100 < 30 { 5.0 } else { 9.0 + f64::from(y) * 0.05 };
+    let tiles = [0, 1].map(|frame| SeenTiles::of_depths(&camera(frame), depths).unwrap());
+    let mut seen = SeenTiles::new(&camera(0));
+    let mut planner = Planner::new();
+    let mut steps = || {
+        for i in 0..4 {
+            seen.set(&camera(0), |index| tiles[0].tiles()[index]).unwrap();
+            let bounds =
+                Bounds { seen: Some(Seen { tiles: &seen, moving: &[], clearance: 0.0 }), ..bounds };
+            let view = camera(i % 2);
+            planner.plan(&view, &lights[..1], &bounds, &Technique::default()).unwrap();
+        }
+    };
+    (0..3).for_each(|_| steps());
+    let before = ALLOCATIONS.with(Cell::get);
+    steps();
+    assert_eq!(ALLOCATIONS.with(Cell::get), before, "seen tiles");
 }

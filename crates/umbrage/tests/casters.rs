@@ -156,7 +156,7 @@ fn casters_keep_their_depths_if_asked() {
     let bounds = Bounds {
         receivers: Some(Aabb::new(DVec3::new(-50.0, 0.0, -60.0), DVec3::new(50.0, 1.0, 10.0))),
         casters: Some(Aabb::new(DVec3::new(-80.0, 0.0, -90.0), DVec3::new(80.0, 40.0, 40.0))),
-        receiver_parts: None,
+        ..Bounds::default()
     };
     let spot = |height: f64| {
         Light::Spot(SpotLight {
@@ -216,7 +216,7 @@ fn casters_beside_a_map_count_as_far_as_filters_reach() {
     let camera = camera(60.0);
     let light = Light::Directional { direction: DVec3::new(0.2, -1.0, 0.1) };
     let floor = Aabb::new(DVec3::new(-10.0, 0.0, -40.0), DVec3::new(10.0, 0.1, 10.0));
-    let bounds = Bounds { receivers: Some(floor), casters: None, receiver_parts: None };
+    let bounds = Bounds { receivers: Some(floor), ..Bounds::default() };
     for warp in [Warp::Uniform, Warp::Lispsm, Warp::Adaptive(Objective::Storage)] {
         let mut planner = planner();
         let mut misses = |filter| {

@@ -7,7 +7,8 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
     Aabb, Bounds, BoxTree, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt,
-    Partition, Plan, Planner, PointLight, Size, Splits, SpotLight, Technique, Warp,
+    Partition, Plan, Planner, PointLight, Seen, SeenTiles, Size, Splits, SpotLight, Technique,
+    Warp,
 };
 
 const VIEW: LookAt = LookAt {
@@ -74,6 +75,8 @@ fn lights_and_bounds_name_what_is_wrong() {
         field(planner().plan(&camera, &[SUN, light], bounds, &Technique::default()))
     };
     let none = Bounds::default();
+    let tiles = SeenTiles::new(&camera);
+    let seen = Seen { tiles: &tiles, moving: &[], clearance: 0.0 };
     for direction in [DVec3::ZERO, DVec3::NAN, DVec3::new(0.0, f64::INFINITY, 0.0)] {
         assert_eq!(plan(Light::Directional { direction }, &none), "light.direction");
     }
@@ -103,6 +106,8 @@ fn lights_and_bounds_name_what_is_wrong() {
     for (bounds, expected) in [
         (Bounds { receivers: Some(upside_down), ..none }, "bounds.receivers"),
         (Bounds { casters: Some(nan), ..none }, "bounds.casters"),
+        (Bounds { seen: Some(Seen { moving: &[nan], ..seen }), ..none }, "bounds.seen.moving"),
+        (Bounds { seen: Some(Seen { clearance: -1.0, ..seen }), ..none }, "bounds.seen.clearance"),
     ] {
         assert_eq!(plan(SUN, &bounds), expected);
     }

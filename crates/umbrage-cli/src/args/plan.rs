@@ -59,7 +59,7 @@ impl Plan {
         {
             ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
         }
-        ensure!(self.fit == Fit::Box, "--fit surfaces needs a SCENE, whose surfaces they are");
+        ensure!(self.fit == Fit::Box, "--fit: `surfaces` and `seen` need a SCENE, which has them");
         Ok(())
     }
 }

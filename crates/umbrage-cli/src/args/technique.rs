@@ -49,6 +49,8 @@ pub(crate) enum Fit {
     Box,
     /// Some hundred boxes around its surfaces.
     Surfaces,
+    /// What the picture shows, tile by tile.
+    Seen,
 }
 
 impl From<Fit> for umbrage_lab::Fit {
@@ -56,6 +58,7 @@ impl From<Fit> for umbrage_lab::Fit {
         match fit {
             Fit::Box => Self::Box,
             Fit::Surfaces => Self::Surfaces,
+            Fit::Seen => Self::Seen,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `--fit`: maps for the box around a scene, or for its surfaces.
+//! `--fit`: maps for the box around a scene, for its surfaces, or for what is seen.
 
 use crate::bad_input::refuses;
 use crate::desk::{Desk, STAGE_GLTF};
@@ -59,6 +59,26 @@ fn maps_of_surfaces_are_less_wrong_and_know_their_casters() {
 }
 
 #[test]
+fn what_is_seen_takes_fewer_texels_than_what_is_there() {
+    let desk = Desk::new();
+    for (scene, shadows) in [("town", "adaptive"), ("lantern", "uniform")] {
+        let storage = |fit: &str| {
+            let plan = ["plan", scene, "--shadows", shadows, "--json", "--fit", fit];
+            number(&desk.json(&plan)["storage_factor"])
+        };
+        let [surfaces, seen] = ["surfaces", "seen"].map(storage);
+        assert!(seen < surfaces, "{scene}, {shadows}: {seen}, {surfaces}");
+    }
+    let town = ["compare", "town", "-o", "report", "--json", "--size", "96x54", "--fit", "seen"];
+    for backend in ["reference", "auto"] {
+        let shadows = ["--shadows", "adaptive@512", "--backend", backend];
+        let report = desk.json(&[&town[..], &shadows].concat());
+        let wrong = number(&report["results"][0]["wrong_fraction"]);
+        assert!(wrong < 0.1, "{backend}: {wrong}");
+    }
+}
+
+#[test]
 fn a_sweep_goes_on_with_the_fit_it_began_with() {
     let desk = Desk::new();
     desk.write("views.json", &json!([{"name": "pole", "scene": "pole"}]).to_string());
@@ -74,9 +94,11 @@ fn a_sweep_goes_on_with_the_fit_it_began_with() {
 #[test]
 fn fits_that_cannot_be() {
     let desk = Desk::new();
-    refuses(&desk, &["plan", "pole", "--fit", "air"], "[possible values: box, surfaces]");
+    refuses(&desk, &["plan", "pole", "--fit", "air"], "[possible values: box, surfaces, seen]");
     let view = ["plan", "--eye", "0,2,0", "--target", "0,2,-1", "--near", "1", "--far", "9"];
-    let fitted = [&view[..], &["--fit", "surfaces"]].concat();
-    refuses(&desk, &fitted, "--fit surfaces needs a SCENE");
+    for fit in ["surfaces", "seen"] {
+        let fitted = [&view[..], &["--fit", fit]].concat();
+        refuses(&desk, &fitted, "--fit: `surfaces` and `seen` need a SCENE");
+    }
     desk.succeed(&[&view[..], &["--fit", "box"]].concat());
 }

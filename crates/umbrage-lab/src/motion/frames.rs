@@ -3,9 +3,10 @@
 use crate::error::{About, Error, Field};
 use crate::executor::{Executor, RenderScene};
 use crate::planning;
+use crate::receivers::Receivers;
 use crate::technique::NamedTechnique;
 use glam::{DQuat, DVec3};
-use umbrage::{Bounds, Camera, Light, LookAt, Plan};
+use umbrage::{Camera, Light, LookAt, Plan};
 use umbrage_trace::View;
 
 /// A motion of the viewer or the light, in steps as small as between the frames of a film.
@@ -28,8 +29,8 @@ pub enum Motion {
 pub struct MovingView<'a> {
     /// The scene that is rendered.
     pub scene: &'a RenderScene<'a>,
-    /// Bounds of the scene, which tell the planner where shadows fall.
-    pub bounds: &'a Bounds<'a>,
+    /// The scene's receivers, which tell the planner where shadows fall.
+    pub receivers: &'a Receivers,
     /// The view of the first frame.
     pub look_at: LookAt,
     /// The light of the first frame.
@@ -106,12 +107,18 @@ impl<'a> Frame<'a> {
         samples: u32,
         techniques: &[NamedTechnique],
     ) -> Result<Vec<Self>, Error> {
-        let MovingView { scene, bounds, look_at, light, .. } = *moving;
+        let MovingView { scene, receivers, look_at, light, .. } = *moving;
+        // What was seen in the frame before serves a frame, as where depths are read back from a
+        // GPU.
+        let mut before = None;
         let frame = |i| {
             let (camera, light) = motion.frame(look_at, light, i)?;
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
-            let plan = |t| planning::plan(t, &camera, &light, bounds);
+            let seen = scene.seen(receivers, &camera)?;
+            let bounds = receivers.bounds(before.as_ref().or(seen.as_ref()));
+            let plan = |t| planning::plan(t, &camera, &light, &bounds);
             let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
+            before = seen;
             Ok(Self { view, plans })
         };
         (0..frames).map(frame).collect()

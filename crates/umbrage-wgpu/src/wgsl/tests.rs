@@ -136,7 +136,7 @@ fn no_filter_has_a_loop() {
 }
 
 #[test]
-fn every_caster_module_is_valid() {
+fn every_other_module_is_valid() {
     for depth_clip_control in [true, false] {
         let support = Support { depth_clip_control, ..Support::FULL };
         for is_masked in [true, false] {
@@ -145,6 +145,9 @@ fn every_caster_module_is_valid() {
         validated(&caster(3, &support));
     }
     validated(include_str!("clear.wesl"));
+    for is_multisampled in [false, true] {
+        validated(&seen(is_multisampled));
+    }
 }
 
 #[test]
@@ -237,6 +240,19 @@ fn structs_are_laid_out_alike() {
     assert_eq!(members.iter().map(|m| m.1).collect::<Vec<_>>(), ours);
     assert_eq!(span, size_of::<data::PrefilterMap>());
     check_layout!(&module, "ShadowMask", data::Mask, [factor, cutoff]);
+    let (module, _) = validated(&seen(false));
+    check_layout!(
+        &module,
+        "ShadowSeenPicture",
+        crate::seen::Picture,
+        [size, background, limit, toward, padding]
+    );
+    check_layout!(
+        &module,
+        "ShadowSeenTile",
+        crate::seen::Tile,
+        [pixels, slope, depths, base, jump, is_seen, padding]
+    );
 }
 
 #[test]
@@ -292,6 +308,7 @@ fn shaders() -> Vec<Shader> {
         shaders.push(caster_shader(0, &support));
         shaders.extend([true, false].map(|is_masked| mesh_shader(&support, is_masked)));
     }
+    shaders.extend([false, true].map(seen_shader));
     unlike(shaders.into_iter())
 }
 

@@ -9,6 +9,8 @@ mod deferred;
 mod filter_at_run_time;
 #[path = "../../cookbook/filters_per_light.rs"]
 mod filters_per_light;
+#[path = "../../cookbook/fit_to_seen.rs"]
+mod fit_to_seen;
 pub(crate) mod kitchen;
 #[path = "../../cookbook/resizing.rs"]
 mod resizing;
@@ -22,10 +24,11 @@ mod two_cameras;
 use crate::device::Bench;
 use bytemuck::cast_slice;
 use filter_at_run_time::change_technique;
+use fit_to_seen::SeenShadows;
 use glam::{DVec2, DVec3, Mat4, Vec3, camera::rh};
 use kitchen::{FORMAT, Kitchen, SIZE, box_at, camera, plain};
 use two_cameras::ViewShadows;
-use umbrage::{Bounds, Camera, Light, PointLight, Technique};
+use umbrage::{Aabb, Bounds, BoxTree, Camera, Light, PointLight, Technique};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, Frame, ShadowOptions, Shadows, Timestamps};
 use wgpu::BufferUsages;
@@ -153,6 +156,44 @@ fn two_cameras_have_shadows_of_their_own() {
         let picture = kitchen.shade(&view.shadows, &pipeline, camera);
         kitchen.check(&picture, camera, |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
     }
+}
+
+/// A camera that goes around a box sees the right shadows in every frame. Its receivers are given
+/// with much air above them, which costs no texels where the camera has stopped.
+#[needs(gpu)]
+#[test]
+fn maps_follow_what_is_seen() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let (device, queue) = (&bench.device, &bench.queue);
+    let technique = technique("uniform:pcf2@1.5px");
+    let mut view = SeenShadows::new(device, bench.support, technique).unwrap();
+    let shader = kitchen::shader("shadow_visibility");
+    let pipeline = kitchen.pipeline(&view.shadows, &shader);
+    let casters = kitchen.casters(&view.shadows);
+    let around = kitchen.bounds().receivers.unwrap();
+    let around = Aabb { max: around.max + DVec3::Y * 2.0, ..around };
+    let receivers = BoxTree::new(&[around]).unwrap();
+    let mut texels = Vec::new();
+    for i in 0..6 {
+        let turn = glam::DQuat::from_rotation_y(0.03 * f64::from(i.min(4)));
+        let camera = kitchen::camera_from(turn * DVec3::new(2.0, 9.0, 3.0));
+        let mut encoder = bench.encoder();
+        view.draw((device, queue), &mut encoder, (&camera, &[SUN]), (&receivers, &[]), |map| {
+            texels.push(map.redraw.shadow_map.resolution.iter().product::<u32>());
+            kitchen.draw(casters.pipeline(), map);
+        })
+        .unwrap();
+        bench.finish(encoder);
+        let (picture, depths) = kitchen.shade_and_keep_depths(&view.shadows, &pipeline, &camera);
+        let mut encoder = bench.encoder();
+        let projection = kitchen::clip_from_view().as_dmat4();
+        view.look((device, queue), &mut encoder, &depths, (&camera, projection)).unwrap();
+        bench.finish(encoder);
+        kitchen.check(&picture, &camera, |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+    }
+    let [boxes, seen] = [texels[0], texels[5]];
+    assert!(seen * 2 < boxes, "{texels:?}");
 }
 
 #[needs(gpu)]

@@ -6,6 +6,7 @@ mod cookbook;
 mod device;
 mod kernels;
 mod partial;
+mod seen;
 mod statistics;
 mod trouble;
 

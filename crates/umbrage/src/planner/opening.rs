@@ -17,13 +17,13 @@ const THICKNESS: f64 = 0.01;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Opening {
     chosen: Vec<Chosen>,
+    /// The boxes chosen, in world space.
+    boxes: Vec<Aabb>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Chosen {
     node: BoxNode,
-    /// The box in local space, as far as it is seen.
-    aabb: Aabb,
     /// The volume of the empty space in the box over the cube of its distance; 0 for single boxes.
     emptiness: f64,
 }
@@ -53,7 +53,7 @@ impl Opening {
                     Some(_) => (aabb.size() / distance + THICKNESS).element_product() * node.empty,
                     None => 0.0,
                 };
-                Chosen { node, aabb, emptiness }
+                Chosen { node, emptiness }
             })
         };
         self.chosen.extend(tree.root().and_then(open));
@@ -68,10 +68,12 @@ impl Opening {
             self.chosen.swap_remove(i);
             self.chosen.extend(children.into_iter().filter_map(open));
         }
+        self.boxes.clear();
+        self.boxes.extend(self.chosen.iter().map(|chosen| chosen.node.aabb));
     }
 
-    /// The boxes chosen, in local space.
-    pub(super) fn boxes(&self) -> impl Iterator<Item = Aabb> {
-        self.chosen.iter().map(|chosen| chosen.aabb)
+    /// The boxes chosen, in world space.
+    pub(super) fn boxes(&self) -> &[Aabb] {
+        &self.boxes
     }
 }

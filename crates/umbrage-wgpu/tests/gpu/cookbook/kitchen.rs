@@ -131,7 +131,12 @@ pub(crate) fn camera_from(eye: DVec3) -> Camera {
 fn clip_from_world(camera: &Camera) -> Mat4 {
     let eye = camera.eye().as_vec3();
     let view = rh::view::look_at_mat4(eye, eye + camera.forward().as_vec3(), camera.up().as_vec3());
-    rh::proj::directx::perspective(0.9, SIZE[0] as f32 / SIZE[1] as f32, 0.1, 60.0) * view
+    clip_from_view() * view
+}
+
+/// The projection of every camera.
+pub(crate) fn clip_from_view() -> Mat4 {
+    rh::proj::directx::perspective(0.9, SIZE[0] as f32 / SIZE[1] as f32, 0.1, 60.0)
 }
 
 /// Pixels that show the ground within 15 metres, and where they do.
@@ -326,6 +331,19 @@ impl Kitchen {
         camera: &Camera,
     ) -> Vec<[u8; 4]> {
         self.shade_with(&[shadows], pipeline, camera)
+    }
+
+    /// The picture that a pipeline makes, and its depths.
+    pub(crate) fn shade_and_keep_depths(
+        &self,
+        shadows: &Shadows,
+        pipeline: &RenderPipeline,
+        camera: &Camera,
+    ) -> (Vec<[u8; 4]>, TextureView) {
+        let [color, normal, depth] = self.targets();
+        let mut encoder = self.bench.encoder();
+        self.encode(&mut encoder, (&[shadows], pipeline), camera, [&color, &normal, &depth]);
+        (self.read(encoder, &color), depth.create_view(&Default::default()))
     }
 
     /// The picture of a shader that looks two kinds of shadows up.

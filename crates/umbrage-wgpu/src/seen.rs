@@ -1,0 +1,449 @@
+//! What the camera saw, from the viewer's depth buffer.
+
+use crate::{Error, Support, wgsl};
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec2, Vec2, Vec4};
+use std::mem::size_of;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use umbrage::{Camera, SeenTile, SeenTiles};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline,
+    ComputePipelineDescriptor, Device, MapMode, PipelineCompilationOptions,
+    PipelineLayoutDescriptor, PollType, Queue, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    TextureFormat, TextureSampleType, TextureUsages, TextureView, TextureViewDimension,
+};
+
+/// How the depths of a depth buffer follow from distances along the view direction: depth =
+/// `at_infinity` + `per_inverse_metre` / distance. Every perspective projection is of this form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthProjection {
+    /// The depth infinitely far away.
+    pub at_infinity: f64,
+    /// The change of depth per 1/m of inverse distance; positive if depth is reversed.
+    pub per_inverse_metre: f64,
+}
+
+impl DepthProjection {
+    /// The depths of a projection matrix with wgpu's clip space, of either handedness, reversed or
+    /// not. The far plane may be infinitely far.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if this is no perspective projection.
+    pub fn of_matrix(clip_from_view: DMat4) -> Result<Self, Error> {
+        let [z, w] = [2, 3].map(|i| clip_from_view.row(i));
+        let is_perspective = clip_from_view.is_finite()
+            && [z.x, z.y, w.x, w.y, w.w] == [0.0; 5]
+            && w.z != 0.0
+            && z.w != 0.0;
+        if !is_perspective {
+            return Err(Error::Invalid {
+                field: "depth.clip_from_view",
+                problem: format!(
+                    "must be a perspective projection, in which depth is a function of z, is {clip_from_view}"
+                ),
+            });
+        }
+        Ok(Self { at_infinity: z.z / w.z, per_inverse_metre: z.w / w.z.abs() })
+    }
+
+    /// The depths between these distances, metres. `far` may be infinite. Reversed depths are 1 at
+    /// the near distance.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless 0 < `near` < `far`.
+    pub fn of_range(near: f64, far: f64, is_reversed: bool) -> Result<Self, Error> {
+        if !(near > 0.0 && near < far && near.is_finite()) {
+            return Err(Error::Invalid {
+                field: "depth.near",
+                problem: format!("must lie between 0 and depth.far ({far}), is {near}"),
+            });
+        }
+        // Depth is (near⁻¹ − z⁻¹)/(near⁻¹ − far⁻¹), which is 0 at the near distance.
+        let per_inverse_metre = -(near.recip() - far.recip()).recip();
+        let at_infinity = -per_inverse_metre / near;
+        Ok(if is_reversed {
+            Self { at_infinity: 1.0 - at_infinity, per_inverse_metre: -per_inverse_metre }
+        } else {
+            Self { at_infinity, per_inverse_metre }
+        })
+    }
+
+    fn check(self) -> Result<(), Error> {
+        let Self { at_infinity, per_inverse_metre } = self;
+        if at_infinity.is_finite() && per_inverse_metre.is_finite() && per_inverse_metre != 0.0 {
+            return Ok(());
+        }
+        Err(Error::Invalid {
+            field: "depth",
+            problem: format!("must be finite and depend on the distance, is {self:?}"),
+        })
+    }
+
+    fn is_reversed(self) -> bool {
+        self.per_inverse_metre > 0.0
+    }
+
+    fn inverse(self, depth: f64) -> f64 {
+        (depth - self.at_infinity) / self.per_inverse_metre
+    }
+}
+
+/// Reduces the viewer's depth buffer to [`SeenTiles`], and reads them back without waiting, a frame
+/// or two late. Given to the planner as [`Bounds::seen`](umbrage::Bounds::seen), they fit the maps
+/// to what is seen.
+///
+/// One compute pass reads each depth a few times. It takes any size, multisampled depths too, and
+/// any perspective projection.
+#[derive(Debug)]
+pub struct SeenReadback {
+    layouts: [BindGroupLayout; 2],
+    /// For depths with one sample, and for several.
+    pipelines: [ComputePipeline; 2],
+    tiles: Buffer,
+    slots: [Slot; SLOTS],
+    frame: u64,
+    /// The frame that `seen` is from.
+    seen_frame: u64,
+    seen: Option<SeenTiles>,
+}
+
+/// Number of frames whose tiles can be on their way.
+const SLOTS: usize = 3;
+
+const TILES: u64 = (SeenTiles::ACROSS * SeenTiles::DOWN) as u64;
+
+/// The tiles of a frame, on their way from the device.
+#[derive(Debug)]
+struct Slot {
+    picture: Buffer,
+    readback: Buffer,
+    /// The depths that were reduced last, with their bind group.
+    bound: Option<(TextureView, BindGroup)>,
+    /// One of the states below. The callback of the mapping has the other reference.
+    state: Arc<AtomicU8>,
+    pending: Option<Pending>,
+}
+
+const WAITING: u8 = 0;
+const MAPPED: u8 = 1;
+const FAILED: u8 = 2;
+
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    frame: u64,
+    camera: Camera,
+    projection: DepthProjection,
+    format: TextureFormat,
+}
+
+/// The struct `ShadowSeenPicture` of `wgsl/seen.wesl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Picture {
+    pub(crate) size: [u32; 2],
+    pub(crate) background: f32,
+    pub(crate) limit: f32,
+    pub(crate) toward: f32,
+    pub(crate) padding: f32,
+}
+
+/// The struct `ShadowSeenTile` of `wgsl/seen.wesl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Tile {
+    pub(crate) pixels: Vec4,
+    pub(crate) slope: Vec2,
+    pub(crate) depths: Vec2,
+    pub(crate) base: f32,
+    pub(crate) jump: f32,
+    pub(crate) is_seen: f32,
+    pub(crate) padding: f32,
+}
+
+impl SeenReadback {
+    /// Makes the pipelines and buffers.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] on devices without compute shaders, or that cannot fetch depths.
+    pub fn new(device: &Device, support: &Support) -> Result<Self, Error> {
+        if !(support.compute && support.depth_fetch) {
+            return Err(Error::Unsupported {
+                what: "compute shaders that fetch depths",
+                why: "with which the viewer's depths are reduced: give boxes of receivers",
+            });
+        }
+        let layouts = [false, true].map(|is_multisampled| layout(device, is_multisampled));
+        let pipelines = [false, true].map(|is_multisampled| {
+            let module = device.create_shader_module(ShaderModuleDescriptor {
+                label: Some("seen tiles"),
+                source: ShaderSource::Wgsl(wgsl::seen(is_multisampled).into()),
+            });
+            let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+                label: Some("seen tiles"),
+                bind_group_layouts: &[Some(&layouts[usize::from(is_multisampled)])],
+                immediate_size: 0,
+            });
+            device.create_compute_pipeline(&ComputePipelineDescriptor {
+                label: Some("seen tiles"),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some("shadow_seen_tile"),
+                compilation_options: PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        });
+        let buffer = |size, usage| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("seen tiles"),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let bytes = TILES * size_of::<Tile>() as u64;
+        let slots = std::array::from_fn(|_| Slot {
+            picture: buffer(
+                size_of::<Picture>() as u64,
+                BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            ),
+            readback: buffer(bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+            bound: None,
+            state: Arc::default(),
+            pending: None,
+        });
+        let tiles = buffer(bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+        Ok(Self { layouts, pipelines, tiles, slots, frame: 0, seen_frame: 0, seen: None })
+    }
+
+    /// Encodes the reduction of a depth buffer that holds a finished picture of `camera`, and the
+    /// way back of its tiles once the commands are submitted. While the tiles of three frames are on
+    /// their way, nothing is encoded.
+    ///
+    /// `depth` is a view of the depth aspect alone, whose texture has the usage `TEXTURE_BINDING`.
+    /// The picture lies at the upper left of the texture, with the size of [`Camera::image`].
+    /// Pixels without a surface have the depth of the far plane: 0 if depth is reversed, otherwise
+    /// 1.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the texture cannot be read, is smaller than the picture, or if the
+    /// projection is not finite.
+    pub fn encode(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        depth: &TextureView,
+        projection: DepthProjection,
+        camera: &Camera,
+    ) -> Result<(), Error> {
+        projection.check()?;
+        check_depths(depth, camera)?;
+        self.collect();
+        let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) else {
+            return Ok(());
+        };
+        let is_multisampled = usize::from(depth.texture().sample_count() > 1);
+        let farthest = SeenTiles::BEYOND * camera.far();
+        let picture = Picture {
+            size: camera.image(),
+            background: if projection.is_reversed() { 0.0 } else { 1.0 },
+            limit: (projection.at_infinity + projection.per_inverse_metre / farthest) as f32,
+            toward: projection.per_inverse_metre.signum() as f32,
+            padding: 0.0,
+        };
+        queue.write_buffer(&slot.picture, 0, bytemuck::bytes_of(&picture));
+        if slot.bound.as_ref().is_none_or(|(bound, _)| bound != depth) {
+            let group = device.create_bind_group(&BindGroupDescriptor {
+                label: Some("seen tiles"),
+                layout: &self.layouts[is_multisampled],
+                entries: &[
+                    BindGroupEntry { binding: 0, resource: BindingResource::TextureView(depth) },
+                    BindGroupEntry { binding: 1, resource: slot.picture.as_entire_binding() },
+                    BindGroupEntry { binding: 2, resource: self.tiles.as_entire_binding() },
+                ],
+            });
+            slot.bound = Some((depth.clone(), group));
+        }
+        {
+            let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor {
+                label: Some("seen tiles"),
+                timestamp_writes: None,
+            });
+            pass.set_pipeline(&self.pipelines[is_multisampled]);
+            pass.set_bind_group(0, slot.bound.as_ref().map(|(_, group)| group), &[]);
+            pass.dispatch_workgroups(SeenTiles::ACROSS, SeenTiles::DOWN, 1);
+        }
+        encoder.copy_buffer_to_buffer(&self.tiles, 0, &slot.readback, 0, slot.readback.size());
+        slot.state.store(WAITING, Ordering::Release);
+        let state = Arc::clone(&slot.state);
+        // The mapping begins when the commands are submitted, so tiles never come from another
+        // frame than the one whose camera is kept here.
+        encoder.map_buffer_on_submit(&slot.readback, MapMode::Read, .., move |result| {
+            state.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
+        });
+        self.frame += 1;
+        let format = depth.texture().format();
+        slot.pending = Some(Pending { frame: self.frame, camera: *camera, projection, format });
+        Ok(())
+    }
+
+    /// The newest tiles that have come back; `None` before the first. This does not wait for the
+    /// device.
+    pub fn latest(&mut self, device: &Device) -> Option<&SeenTiles> {
+        // A lost device has no news; what was seen before stays.
+        let _ = device.poll(PollType::Poll);
+        self.collect();
+        self.seen.as_ref()
+    }
+
+    /// Takes in the tiles that have come back.
+    fn collect(&mut self) {
+        let Self { slots, seen, seen_frame, .. } = self;
+        for slot in slots {
+            let Some(pending) = slot.pending else { continue };
+            match slot.state.load(Ordering::Acquire) {
+                // The commands may still be submitted, or the encoder was dropped, and the callback
+                // with it.
+                WAITING if Arc::strong_count(&slot.state) > 1 => continue,
+                MAPPED => {
+                    if pending.frame > *seen_frame
+                        && let Ok(bytes) = slot.readback.get_mapped_range(..)
+                    {
+                        let tiles: &[Tile] = bytemuck::cast_slice(&bytes);
+                        let seen = seen.get_or_insert_with(|| SeenTiles::new(&pending.camera));
+                        let tile = |index: usize| pending.tile(&tiles[index]);
+                        if seen.set(&pending.camera, tile).is_ok() {
+                            *seen_frame = pending.frame;
+                        }
+                    }
+                    slot.readback.unmap();
+                }
+                _ => {}
+            }
+            slot.pending = None;
+        }
+    }
+}
+
+impl Pending {
+    /// The tile in inverse distances.
+    fn tile(&self, tile: &Tile) -> Option<SeenTile> {
+        if tile.is_seen == 0.0 {
+            return None;
+        }
+        let projection = self.projection;
+        let base = f64::from(tile.base);
+        // What rounding in the buffer and in the shader may have taken off.
+        let step = match self.format {
+            TextureFormat::Depth16Unorm => 2f64.powi(-17),
+            TextureFormat::Depth24Plus | TextureFormat::Depth24PlusStencil8 => 2f64.powi(-25),
+            _ => 0.0,
+        };
+        let [lo, hi] = tile.depths.to_array().map(f64::from);
+        let slack = step + 2f64.powi(-22) * base.abs().max(lo.abs()).max(hi.abs());
+        let mut inverse = [base + lo - slack, base + hi + slack].map(|d| projection.inverse(d));
+        if !projection.is_reversed() {
+            inverse.reverse();
+        }
+        let per_depth = projection.per_inverse_metre.recip();
+        let slope = DVec2::from(tile.slope.to_array().map(f64::from)) * per_depth;
+        let jump = f64::from(tile.jump) * per_depth.abs();
+        Some(SeenTile { pixels: tile.pixels.to_array().map(f64::from), slope, inverse, jump })
+    }
+}
+
+fn check_depths(depth: &TextureView, camera: &Camera) -> Result<(), Error> {
+    let texture = depth.texture();
+    let invalid = |problem| Err(Error::Invalid { field: "depth", problem });
+    if !texture.format().has_depth_aspect() {
+        return invalid(format!("must have depths, but its format is {:?}", texture.format()));
+    }
+    if !texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
+        return invalid("must have the usage TEXTURE_BINDING".into());
+    }
+    let ([width, height], size) = (camera.image(), texture.size());
+    if width > size.width || height > size.height {
+        return invalid(format!(
+            "must hold the camera's picture of {width}x{height} pixels, is {}x{}",
+            size.width, size.height
+        ));
+    }
+    Ok(())
+}
+
+fn layout(device: &Device, multisampled: bool) -> BindGroupLayout {
+    let entry = |binding, ty| BindGroupLayoutEntry {
+        binding,
+        visibility: ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
+    let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let depths = BindingType::Texture {
+        sample_type: TextureSampleType::Depth,
+        view_dimension: TextureViewDimension::D2,
+        multisampled,
+    };
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+        label: Some("seen tiles"),
+        entries: &[
+            entry(0, depths),
+            entry(1, buffer(BufferBindingType::Uniform)),
+            entry(2, buffer(BufferBindingType::Storage { read_only: false })),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec4;
+
+    #[test]
+    fn depths_follow_from_matrix_and_range_alike() {
+        for (near, far) in [(0.1, 50.0), (2.0, f64::INFINITY)] {
+            for is_reversed in [false, true] {
+                let of_range = DepthProjection::of_range(near, far, is_reversed).unwrap();
+                let depth =
+                    |distance: f64| of_range.at_infinity + of_range.per_inverse_metre / distance;
+                let ends = if is_reversed { [1.0, 0.0] } else { [0.0, 1.0] };
+                assert!((depth(near) - ends[0]).abs() < 1e-12, "{of_range:?}");
+                assert!((depth(far) - ends[1]).abs() < 1e-12, "{of_range:?}");
+                for sign in [1.0, -1.0] {
+                    // z looks along ±z: clip z = a z + b, clip w = ±z.
+                    let z = DVec4::new(
+                        0.0,
+                        0.0,
+                        of_range.at_infinity * sign,
+                        of_range.per_inverse_metre,
+                    );
+                    let rows = [DVec4::X, DVec4::Y, z * 3.0, DVec4::Z * sign * 3.0];
+                    let matrix = DMat4::from_cols_array_2d(&rows.map(|r| r.to_array())).transpose();
+                    let of_matrix = DepthProjection::of_matrix(matrix).unwrap();
+                    let error = (of_matrix.at_infinity - of_range.at_infinity).abs()
+                        + (of_matrix.per_inverse_metre - of_range.per_inverse_metre).abs();
+                    assert!(error < 1e-12, "{of_matrix:?} {of_range:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_projection_is_refused() {
+        let field = |error: Error| match error {
+            Error::Invalid { field, .. } => field,
+            other => panic!("{other}"),
+        };
+        let orthographic = DepthProjection::of_matrix(DMat4::IDENTITY).unwrap_err();
+        assert_eq!(field(orthographic), "depth.clip_from_view");
+        let nan = DepthProjection::of_matrix(DMat4::from_cols_array(&[f64::NAN; 16])).unwrap_err();
+        assert_eq!(field(nan), "depth.clip_from_view");
+        for (near, far) in [(0.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0), (1.0, f64::NAN)] {
+            let error = DepthProjection::of_range(near, far, true).unwrap_err();
+            assert_eq!(field(error), "depth.near");
+        }
+    }
+}
