@@ -24,6 +24,8 @@ pub struct BoxTree {
     nodes: Vec<Node>,
     /// The boxes while the tree is built.
     boxes: Vec<Aabb>,
+    /// A hash of all boxes.
+    fingerprint: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,6 +73,7 @@ impl BoxTree {
         self.nodes.clear();
         self.boxes.clear();
         self.boxes.extend(boxes.iter().filter(|b| !b.is_empty()));
+        self.fingerprint = fingerprint(&self.boxes);
         let all = self.boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(*b));
         if !all.is_empty() {
             let thickness = Self::THICKNESS * all.size().max_element();
@@ -84,6 +87,11 @@ impl BoxTree {
         self.nodes.first().map_or(Aabb::EMPTY, |root| root.aabb)
     }
 
+    /// A number that tells whether two trees hold the same boxes in the same order.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
     /// Index of the node that holds all boxes; `None` if there are no boxes.
     pub(crate) fn root(&self) -> Option<u32> {
         (!self.nodes.is_empty()).then_some(0)
@@ -94,6 +102,14 @@ impl BoxTree {
         let children = (second != 0).then_some([index + 1, second]);
         BoxNode { aabb, empty: 1.0 - filled, children }
     }
+}
+
+/// A hash of boxes, by multiplication and rotation of the bits of their coordinates.
+fn fingerprint(boxes: &[Aabb]) -> u64 {
+    let coordinates = boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+    coordinates.fold(boxes.len() as u64, |hash, x| {
+        (hash ^ x.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
+    })
 }
 
 /// Appends the nodes of some boxes. Returns the boxes' total volume.

@@ -1,10 +1,11 @@
 use crate::bounds::{Aabb, Bounds, Plane};
+use crate::box_tree::BoxTree;
 use crate::camera::Camera;
 use crate::error::Error;
 use crate::focus::{Body, frustum_planes, thickened};
 use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
-use crate::plan::{Part, Plan, PlannedLight};
+use crate::plan::{Part, Plan, PlannedLight, ShadowMap};
 use crate::resolution::resolutions;
 use crate::seen::cells::Cells;
 use crate::technique::{Faces, Limits, Technique};
@@ -21,7 +22,8 @@ mod opening;
 mod slices;
 
 /// Plans shadow maps. Keep one planner for each view: it reuses its buffers, so that planning
-/// allocates no memory once they have grown.
+/// allocates no memory once they have grown. Where nothing but some lights has changed since its
+/// last plan, it keeps the maps of the others. A plan depends on its input alone all the same.
 ///
 /// In this example two lights share 2048² texels over four slices each. The plan tells which map
 /// serves a point and whether a box may cast into that map, and an atlas tells where the maps lie:
@@ -78,6 +80,7 @@ pub struct Planner {
     slicing: Slicing,
     drafting: Drafting,
     finishing: Finishing,
+    last: Last,
 }
 
 /// Bodies of receivers, each cut out of the one before.
@@ -89,6 +92,53 @@ struct Bodies {
     lit: Body,
     /// Those that a face of the frustum serves.
     face: Body,
+}
+
+/// What the last plan was made for, so that the next one keeps the maps of lights that are as they
+/// were.
+#[derive(Clone, Debug, Default)]
+struct Last {
+    /// `None` if there is nothing to keep.
+    view: Option<View>,
+    lights: Vec<Light>,
+    units: Vec<[f64; 2]>,
+    sizes: Vec<[u32; 2]>,
+}
+
+/// The input of a plan but for the lights.
+#[derive(Clone, Debug, PartialEq)]
+struct View {
+    camera: Camera,
+    receivers: Option<Aabb>,
+    receiver_parts: Option<u64>,
+    casters: Option<Aabb>,
+    technique: Technique,
+}
+
+impl View {
+    /// `None` if the view is fitted to what was seen, which is different in each frame.
+    fn of(camera: &Camera, bounds: &Bounds<'_>, technique: &Technique) -> Option<Self> {
+        let Bounds { receivers, receiver_parts, seen, casters } = *bounds;
+        let receiver_parts = receiver_parts.map(BoxTree::fingerprint);
+        let (camera, technique) = (*camera, *technique);
+        seen.is_none().then_some(Self { camera, receivers, receiver_parts, casters, technique })
+    }
+}
+
+/// Checked input for the maps of one light.
+#[derive(Clone, Copy)]
+struct Frame<'a> {
+    camera: &'a Camera,
+    bounds: &'a Bounds<'a>,
+    technique: &'a Technique,
+}
+
+/// Sets the value of an index, which is at most the number of values.
+fn set<T>(values: &mut Vec<T>, index: usize, value: T) {
+    match values.get_mut(index) {
+        Some(old) => *old = value,
+        None => values.push(value),
+    }
 }
 
 /// Checked input for the maps of one projector.
@@ -137,34 +187,63 @@ impl Planner {
         technique.check()?;
         self.limits.check(technique)?;
         bounds.check()?;
-        self.plan.origin = camera.eye();
-        self.plan.pixel_gradient = camera.forward() * camera.pixel_width_per_depth();
-        self.plan.filter = technique.filter;
-        self.plan.lights.clear();
+        // If this plan fails, the next one keeps nothing.
+        let view = View::of(camera, bounds, technique);
+        let keeps = view.is_some() && self.last.view.take() == view;
+        if !keeps {
+            self.plan.origin = camera.eye();
+            self.plan.pixel_gradient = camera.forward() * camera.pixel_width_per_depth();
+            self.plan.filter = technique.filter;
+            self.last.lights.clear();
+            self.focus(camera, bounds);
+        }
+        std::mem::swap(&mut self.units, &mut self.last.units);
+        std::mem::swap(&mut self.sizes, &mut self.last.sizes);
         self.units.clear();
-        self.focus(camera, bounds);
         for (index, light) in lights.iter().enumerate() {
             let light = light.checked()?;
             check_light_size(technique, &light)?;
-            let first = self.units.len();
-            for (side, projector) in light.projectors() {
-                let part = Part { light: index, side, ..Part::default() };
-                self.draft_projector(
-                    part,
-                    &Request { camera, projector: &projector, bounds, technique },
-                );
-            }
-            let theta_rad = self.theta(&light, camera);
-            self.plan.lights.push(PlannedLight { maps: first..self.units.len(), theta_rad });
+            self.plan_light(index, light, &Frame { camera, bounds, technique });
         }
-        let Self { limits, plan, drafts, units, sizes, finishing, .. } = self;
-        plan.maps.truncate(units.len());
+        self.last.lights.truncate(lights.len());
+        let Self { limits, plan, drafts, units, sizes, finishing, last, .. } = self;
+        plan.lights.truncate(lights.len());
+        plan.maps.resize_with(units.len(), ShadowMap::default);
         resolutions(technique, *limits, units, sizes)?;
         let request = FinishRequest { camera, bounds, technique, limits: *limits };
-        for ((map, draft), &size) in plan.maps.iter_mut().zip(drafts).zip(&*sizes) {
-            finishing.finish(map, draft, size, &request)?;
+        for (i, (map, draft)) in plan.maps.iter_mut().zip(drafts).enumerate() {
+            if !(draft.is_kept && last.sizes[i] == sizes[i]) {
+                map.copy_from(&draft.map);
+                finishing.finish(map, draft, sizes[i], &request)?;
+            }
+            draft.is_kept = true;
         }
+        last.view = view;
         Ok(plan)
+    }
+
+    /// Drafts the maps of one light, or keeps those of the last plan if nothing has changed.
+    fn plan_light(&mut self, index: usize, light: Light, frame: &Frame<'_>) {
+        let Frame { camera, bounds, technique } = *frame;
+        let first = self.units.len();
+        let same = self.last.lights.get(index).is_some_and(|last| *last == light);
+        if let (true, Some(planned)) = (same, self.plan.lights.get(index)) {
+            if planned.maps.start == first {
+                self.units.extend_from_slice(&self.last.units[planned.maps.clone()]);
+                return;
+            }
+        }
+        for (side, projector) in light.projectors() {
+            let part = Part { light: index, side, ..Part::default() };
+            self.draft_projector(
+                part,
+                &Request { camera, projector: &projector, bounds, technique },
+            );
+        }
+        let theta_rad = self.theta(&light, camera);
+        let planned = PlannedLight { maps: first..self.units.len(), theta_rad };
+        set(&mut self.plan.lights, index, planned);
+        set(&mut self.last.lights, index, light);
     }
 
     /// Finds the body of the receivers that the camera sees.

@@ -201,6 +201,52 @@ proptest! {
         prop_assert_eq!(format!("{again:?}"), format!("{fresh:?}"));
     }
 
+    /// Where some lights alone have changed, a planner keeps the maps of the others. The plan is that
+    /// of a new planner, to the last bit.
+    #[test]
+    fn kept_maps_are_those_of_a_new_plan(
+        config in config(),
+        lights in proptest::collection::vec((0..3u8, direction()), 2..5),
+        others in proptest::collection::vec((0..5usize, 0..3u8, direction()), 1..6),
+        boxes in proptest::bool::ANY,
+        partition in partition(),
+        pick in 0..WARPS.len(),
+        size in prop_oneof![Just(Size::Budget(1 << 22)), Just(Size::Exact([300, 200]))],
+    ) {
+        let spread = WARPS[pick].1;
+        let technique =
+            Technique { partition: possible(partition, spread), size, ..common::technique(spread) };
+        let all = config.bounds.receivers.filter(|_| boxes);
+        let tree = umbrage::BoxTree::new(all.as_slice()).unwrap();
+        let bounds = Bounds { receiver_parts: all.map(|_| &tree), ..config.bounds };
+        let light = |kind: u8, direction: DVec3| match kind {
+            0 => Light::Directional { direction },
+            1 => {
+                let (near, range) = (config.camera.near(), config.camera.far());
+                let position = config.camera.eye() + direction * 0.3 * range;
+                Light::Point(PointLight { position, near, range })
+            }
+            _ => config.light,
+        };
+        let mut lights: Vec<Light> = lights.into_iter().map(|(kind, d)| light(kind, d)).collect();
+        let mut keeping = planner();
+        for (index, kind, direction) in others {
+            let light = light(kind, direction);
+            let [kept, fresh] = [&mut keeping, &mut planner()].map(|planner| {
+                format!("{:?}", planner.plan(&config.camera, &lights, &bounds, &technique))
+            });
+            prop_assert_eq!(kept, fresh);
+            // Some lights go, some come, some turn into others.
+            if index < lights.len() {
+                lights[index] = light;
+            } else if lights.len() > 2 {
+                lights.remove(0);
+            } else {
+                lights.push(light);
+            }
+        }
+    }
+
     /// Maps of several lights equal those planned for each light alone, but for their resolution.
     #[test]
     fn lights_do_not_mix(

@@ -20,6 +20,10 @@ use glam::{DMat3, DMat4, DVec2, DVec3};
 /// What the planner knows about a map besides the map itself.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Draft {
+    /// The map, with everything that does not depend on its resolution.
+    pub(super) map: ShadowMap,
+    /// Whether the draft is that of the last plan.
+    pub(super) is_kept: bool,
     /// The receivers that the map serves.
     pub(super) body: Body,
     /// The body's bounding box; not set if the body is empty.
@@ -80,7 +84,6 @@ impl Drafting {
     /// in s and t if it had one texel, pixels per texel, or 0 if it serves no receivers.
     pub(super) fn draft(
         &mut self,
-        map: &mut ShadowMap,
         draft: &mut Draft,
         along: &Along,
         warp: Warp,
@@ -93,7 +96,7 @@ impl Drafting {
         };
         let camera = request.camera;
         let Self { covered, outline, worst, .. } = self;
-        let Draft { body, seen, shape, .. } = draft;
+        let Draft { map, body, seen, shape, .. } = draft;
         // The errors of a map of one texel determine the resolution.
         map.resolution = [1, 1];
         map.apex = space.apex;
@@ -257,6 +260,15 @@ impl Default for ShadowMap {
 }
 
 impl ShadowMap {
+    /// Replaces the map by a copy of another. (`Clone::clone_from` would not keep the buffers.)
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        let [mut cell, mut caster_planes] =
+            [&mut self.cell, &mut self.caster_planes].map(std::mem::take);
+        cell.clone_from(&other.cell);
+        caster_planes.clone_from(&other.caster_planes);
+        *self = Self { cell, caster_planes, ..*other };
+    }
+
     /// Makes the map empty, but keeps its buffers.
     pub(super) fn clear(&mut self, camera: &Camera) {
         let [mut cell, mut caster_planes] =

@@ -6,7 +6,7 @@ use crate::casters::caster_planes;
 use crate::focus::Body;
 use crate::math::range;
 use crate::partition::{self, Along};
-use crate::plan::{Face, Part, ShadowMap};
+use crate::plan::{Face, Part};
 use crate::stable::Stable;
 use crate::technique::{Cover, Partition, Warp};
 use crate::warp::{LightSpace, Precision};
@@ -14,9 +14,8 @@ use crate::warp::{LightSpace, Precision};
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Slicing {
-    /// A slice on trial, and its map.
+    /// A slice on trial.
     draft: Draft,
-    trial: ShadowMap,
 }
 
 /// How one part of the view is sliced.
@@ -58,7 +57,7 @@ impl Planner {
         request: &Request<'_>,
     ) -> partition::Ends {
         let Request { camera, technique, .. } = *request;
-        let (body, Slicing { draft, trial }) = (&self.bodies.face, &mut self.slicing);
+        let (body, Slicing { draft }) = (&self.bodies.face, &mut self.slicing);
         let [n, f] = if technique.cover == Cover::Stable || body.is_empty() {
             [camera.near(), camera.far()]
         } else {
@@ -70,8 +69,8 @@ impl Planner {
             let end = (to < f).then(|| along.plane_at(to, camera)).flatten().map(Plane::flipped);
             clip_between(&mut draft.body, body, [begin, end]);
             if matches!(warp, Warp::Psm | Warp::Log) {
-                trial.clear(camera);
-                let [s, t] = self.drafting.draft(trial, draft, along, warp, request);
+                draft.map.clear(camera);
+                let [s, t] = self.drafting.draft(draft, along, warp, request);
                 return s * t;
             }
             self.drafting.storage(draft, along, warp, request)
@@ -83,13 +82,12 @@ impl Planner {
         let Slices { part, along, partition, warp, ends } = slices;
         let Request { camera, technique, .. } = *request;
         let index = self.units.len();
-        if self.plan.maps.len() == index {
-            self.plan.maps.push(ShadowMap::default());
-        }
         if self.drafts.len() == index {
             self.drafts.push(Draft::default());
         }
-        let (map, draft) = (&mut self.plan.maps[index], &mut self.drafts[index]);
+        let draft = &mut self.drafts[index];
+        draft.is_kept = false;
+        let map = &mut draft.map;
         map.clear(camera);
         map.part = Part { slice, ..*part };
         let split = [ends[slice], ends[slice + 1]];
@@ -114,7 +112,7 @@ impl Planner {
         draft.shape = None;
         let space = LightSpace::fixed(request.projector, camera);
         let unit = match draft.stable {
-            None => self.drafting.draft(map, draft, along, *warp, request),
+            None => self.drafting.draft(draft, along, *warp, request),
             Some(stable) => {
                 draft.bounds = draft.body.bounds();
                 draft.see(&space, camera, Precision::Final);
@@ -124,8 +122,8 @@ impl Planner {
             }
         };
         self.units.push(unit);
+        let Draft { map, body, bounds, outline, .. } = draft;
         let around = self.around.iter().chain(&map.cell).copied();
-        let Draft { body, bounds, outline, .. } = &*draft;
         caster_planes(&mut map.caster_planes, around, body, *bounds, &space, outline);
     }
 }
