@@ -126,12 +126,12 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
             LookupBuffers::Uniform => module!("buffers/uniform"),
             LookupBuffers::Storage => module!("buffers/storage"),
         },
-        module!("choice"),
         module!("receiver"),
     ]);
     if !filter.has_maps() {
         return shader;
     }
+    shader.add([module!("choice")]);
     add_width(&mut shader, &filter);
     add_reach(&mut shader, &filter);
     let depths = match layout {

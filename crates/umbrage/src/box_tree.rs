@@ -106,7 +106,8 @@ impl BoxTree {
 
 /// A hash of boxes, by multiplication and rotation of the bits of their coordinates.
 fn fingerprint(boxes: &[Aabb]) -> u64 {
-    let coordinates = boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
+    let coordinates =
+        boxes.iter().flat_map(|b| b.min.to_array().into_iter().chain(b.max.to_array()));
     coordinates.fold(boxes.len() as u64, |hash, x| {
         (hash ^ x.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29)
     })
