@@ -16,7 +16,7 @@ use std::time::Instant;
 use umbrage::{Bounds, BoxTree, Camera, Light, LookAt, Planner, Size, SpotLight, Technique};
 use umbrage_render::{Drawn, Gpu, Renderer, SceneBuffers};
 use umbrage_trace::Tracer;
-use umbrage_wgpu::{Casters, ShadowOptions};
+use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -78,7 +78,11 @@ fn run(
     mut lights: Vec<Light>,
     motion: Motion,
 ) -> Result<(), Failure> {
-    let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+    let options = ShadowOptions {
+        filter: technique.filter,
+        buffers: LookupBuffers::for_technique(technique, lights.len()),
+        ..ShadowOptions::default()
+    };
     let mut renderer = Renderer::new(gpu, buffers, &options)?;
     let mut planner = Planner::with_limits(gpu.support().limits());
     let [mut planning, mut drawing] = [Vec::new(), Vec::new()];

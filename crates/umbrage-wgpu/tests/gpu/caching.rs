@@ -7,10 +7,14 @@ use umbrage::{
     Aabb, Light, Partition, Plan, Planner, PointLight, ShadowMap, Size, SpotLight, Technique, Warp,
 };
 use umbrage_testing::needs;
-use umbrage_wgpu::{Casters, Frame, Layout, ShadowOptions, Shadows, Timestamps};
+use umbrage_wgpu::{Casters, Frame, Layout, LookupBuffers, ShadowOptions, Shadows, Timestamps};
 
 fn shadows(bench: &Bench, layout: Layout) -> Shadows {
-    let options = ShadowOptions { layout, ..ShadowOptions::default() };
+    shadows_with(bench, layout, LookupBuffers::default())
+}
+
+fn shadows_with(bench: &Bench, layout: Layout, buffers: LookupBuffers) -> Shadows {
+    let options = ShadowOptions { layout, buffers, ..ShadowOptions::default() };
     Shadows::new(&bench.device, bench.support, &options).unwrap()
 }
 
@@ -222,7 +226,7 @@ fn of_many_lights_only_those_are_drawn_that_are_seen_and_change() {
     // Sizes that follow from an error do not depend on the other lights.
     let technique = Technique { size: Size::MaxError(8.0), ..Technique::default() };
     for layout in [Layout::Atlas, Layout::Layers] {
-        let mut shadows = shadows(&bench, layout);
+        let mut shadows = shadows_with(&bench, layout, LookupBuffers::Storage);
         let plan = self::plan(&camera(EYE), &lights, &technique);
         assert_eq!(plan.maps.len(), 64 + 8 * 6);
         let seen: Vec<usize> = (0..plan.maps.len()).filter(|&i| !plan.maps[i].is_empty()).collect();
