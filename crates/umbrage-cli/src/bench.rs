@@ -68,6 +68,8 @@ struct TimesJson {
     shade_none: Option<Spread>,
     /// Until what was seen is back from the GPU; `null` without `--fit seen`.
     seen: Option<Spread>,
+    /// The CPU's share that is not planning; `null` for the reference.
+    cpu: Option<Spread>,
     frame: Option<Spread>,
 }
 
@@ -267,6 +269,7 @@ impl<'a> Contender<'a> {
                 shade: self.spread(|f| Some(f.costs.shade)),
                 shade_none: none.spread(|f| Some(f.costs.shade)),
                 seen: self.spread(|f| f.costs.seen),
+                cpu: self.spread(|f| f.costs.cpu),
                 frame: self.spread(|f| Some(f.frame)),
             },
             // Frames of the same turn are compared, as both see what else the machine does then.
@@ -307,6 +310,7 @@ fn table(bench: &BenchJson) -> String {
         "shade",
         "cost",
         "seen",
+        "cpu",
         "frame",
         "first frame",
         "maps",
@@ -330,6 +334,7 @@ fn table(bench: &BenchJson) -> String {
             ms(r.ms.shade, 2),
             ms(r.cost, 2),
             ms(r.ms.seen, 2),
+            ms(r.ms.cpu, 2),
             ms(r.ms.frame, 2),
             format!("{:.2}", r.first_ms.frame),
             r.maps.to_string(),

@@ -25,6 +25,9 @@ pub struct Costs {
     /// Time until what was [seen](crate::Fit::Seen) is back from the GPU, which renderers need not
     /// wait for; `None` if the maps are not fitted to that, or for the CPU reference.
     pub seen: Option<f64>,
+    /// Time that the CPU takes to cull, to encode and to submit the frame's work, without planning
+    /// and without waiting for the GPU; `None` for the CPU reference.
+    pub cpu: Option<f64>,
     /// What was drawn into which map, by the map's index in the plan; `None` for the CPU reference.
     pub drawn: Option<Vec<(usize, Drawn)>>,
 }
@@ -109,25 +112,30 @@ fn frame_on_gpu(
     let start = Instant::now();
     let shading = Shading { camera: view.camera(), light: view.light(), light_index: 0 };
     let drawn = renderer.draw_maps(plan, casters, timer)?;
-    let [depth, filter, shade] = match timer {
+    let for_maps = milliseconds(start);
+    let ([depth, filter, shade], for_picture) = match timer {
         Some(timer) => {
+            let start = Instant::now();
             renderer.frame(&shading, target, Some(timer))?;
-            timer.read(gpu)?
+            let for_picture = milliseconds(start);
+            (timer.read(gpu)?, for_picture)
         }
         None => {
             gpu.wait()?;
             let depth = milliseconds(start);
             let shaded = Instant::now();
             renderer.frame(&shading, target, None)?;
+            let for_picture = milliseconds(shaded);
             gpu.wait()?;
-            [depth, 0.0, milliseconds(shaded)]
+            ([depth, 0.0, milliseconds(shaded)], for_picture)
         }
     };
+    let cpu = Some(for_maps + for_picture);
     let [depth, filter] = if drawn.is_empty() { [0.0; 2] } else { [depth, filter] };
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
-    Ok(Costs { bytes, depth, filter, shade, seen: None, drawn: Some(drawn) })
+    Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn) })
 }
 
 fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Result<Costs, Error> {
@@ -139,5 +147,6 @@ fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Resu
         Rows::new(view, range, &|_| {}).by_reference(plan, &reference);
     }
     let bytes = reference.bytes();
-    Ok(Costs { bytes, depth, filter: None, shade: milliseconds(shaded), seen: None, drawn: None })
+    let shade = milliseconds(shaded);
+    Ok(Costs { bytes, depth, filter: None, shade, seen: None, cpu: None, drawn: None })
 }

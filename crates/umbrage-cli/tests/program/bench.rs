@@ -25,7 +25,7 @@ fn every_stage_has_its_times() {
             assert_eq!(result["map_draws"].as_array().unwrap().len(), maps);
             assert!(result["map_draws"][0]["triangles"].as_u64().unwrap() > 0);
             assert!(result["bytes"].as_u64().unwrap() >= 4 * result["texels"].as_u64().unwrap());
-            let stages = ["depth", "filter", "frame", "plan", "seen", "shade", "shade_none"];
+            let stages = ["cpu", "depth", "filter", "frame", "plan", "seen", "shade", "shade_none"];
             assert_eq!(keys(&result["ms"]), stages);
             for stage in ["plan", "depth", "shade", "shade_none", "frame"] {
                 let spread = &result["ms"][stage];
