@@ -326,11 +326,10 @@ fn solve(
         let pivot = (column..unknowns).max_by(largest).unwrap_or(column);
         matrix.swap(column, pivot);
         right.swap(column, pivot);
+        let pivot = matrix[column];
         for row in column + 1..unknowns {
-            let factor = matrix[row][column] / matrix[column][column];
-            for j in column..unknowns {
-                matrix[row][j] -= factor * matrix[column][j];
-            }
+            let factor = matrix[row][column] / pivot[column];
+            matrix[row].iter_mut().zip(pivot).for_each(|(to, from)| *to -= factor * from);
             right[row] -= factor * right[column];
         }
     }

@@ -5,7 +5,7 @@ use crate::aliasing::Local;
 use crate::bounds::Aabb;
 use crate::camera::Camera;
 use crate::casters::{convex_outline, outer_points};
-use crate::focus::Body;
+use crate::focus::{Body, CellView};
 use crate::math::range;
 use crate::matrices::{DepthRange, filling_unit_square, lambda, matrices};
 use crate::partition::Along;
@@ -199,7 +199,8 @@ impl Drafting {
                 // points on edges suffice to choose a warp; the errors reported do not depend on
                 // them. Where there are many cells, their vertices lie close enough.
                 let vertices = draft.body.vertices();
-                covered.extend(draft.body.cells().flat_map(|c| c.edges()).flat_map(|[a, b]| {
+                let edges = draft.body.cells().flat_map(CellView::edges);
+                covered.extend(edges.flat_map(|[a, b]| {
                     [0.25, 0.5, 0.75].map(|k| see(vertices[a].lerp(vertices[b], k)))
                 }));
             }
