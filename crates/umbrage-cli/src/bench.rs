@@ -191,8 +191,12 @@ fn take_turns(
         contenders.rotate_left(first);
         for contender in contenders.iter_mut() {
             bar.stage(&contender.technique.to_string());
-            let start = Instant::now();
             let Contender { technique, bencher, planner, frames } = contender;
+            if !args.still {
+                // As where the camera moves.
+                planner.forget();
+            }
+            let start = Instant::now();
             let plan = plan_with(planner, technique, view.camera(), view.light(), bounds)?;
             let planned = milliseconds(start);
             let costs = bencher.frame(view, plan, args.still)?;

@@ -58,6 +58,7 @@ pub(crate) fn timed_plan(
     let mut planner = planner();
     let mut plan = Plan::default();
     let ms = median_time(|| {
+        planner.forget();
         let start = Instant::now();
         let planned = plan_with(&mut planner, technique, camera, light, bounds)?;
         let ms = milliseconds(start);

@@ -111,6 +111,7 @@ fn planning(criterion: &mut Criterion) {
             let mut planner = Planner::new();
             group.bench_function(text, |b| {
                 b.iter(|| {
+                    planner.forget();
                     let plan = planner.plan(black_box(&camera), &[light], &bounds, &technique);
                     plan.expect("a plan").maps.len()
                 });

@@ -40,6 +40,7 @@ fn plan(c: &mut Criterion) {
         let mut planner = Planner::new();
         group.bench_function(text, |b| {
             b.iter(|| {
+                planner.forget();
                 planner.plan(black_box(&camera), &[light], &bounds, &technique).unwrap().maps.len()
             });
         });

@@ -165,6 +165,12 @@ impl Planner {
         Self { limits, ..Self::default() }
     }
 
+    /// Forgets the last plan, so that the next one keeps nothing of it. The plan is the same; this is
+    /// for measuring what a plan costs when everything has changed.
+    pub fn forget(&mut self) {
+        self.last.view = None;
+    }
+
     /// The texture sizes that the device allows.
     pub fn limits(&self) -> Limits {
         self.limits

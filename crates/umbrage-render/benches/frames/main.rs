@@ -149,6 +149,8 @@ impl<'a> Set<'a> {
     ) -> Result<&'p Plan, Failure> {
         let bounds = Bounds::of_scene(self.case.scene.bounds());
         let bounds = Bounds { receiver_parts: Some(&self.boxes), ..bounds };
+        // As where the camera moves.
+        planner.forget();
         Ok(planner.plan(&self.camera, &[self.case.light], &bounds, technique)?)
     }
 
