@@ -110,6 +110,7 @@ struct Set<'a> {
     case: &'a Case,
     buffers: SceneBuffers<'a>,
     camera: Camera,
+    all: umbrage::Aabb,
     boxes: umbrage::BoxTree,
     target: FrameTarget,
     /// `None` if the GPU has no timestamps. Times are then taken from the wall clock.
@@ -132,6 +133,7 @@ impl<'a> Set<'a> {
             case,
             buffers: SceneBuffers::new(gpu, &case.scene, true)?,
             camera: Camera::look_at(case.look_at(image))?,
+            all: case.scene.bounds(),
             boxes: umbrage::BoxTree::new(&Tracer::new(&case.scene)?.boxes(256))?,
             target: FrameTarget::new(gpu, image)?,
             timer: Timer::new(gpu),
@@ -147,8 +149,7 @@ impl<'a> Set<'a> {
         planner: &'p mut Planner,
         technique: &Technique,
     ) -> Result<&'p Plan, Failure> {
-        let bounds = Bounds::of_scene(self.case.scene.bounds());
-        let bounds = Bounds { receiver_parts: Some(&self.boxes), ..bounds };
+        let bounds = Bounds { receiver_parts: Some(&self.boxes), ..Bounds::of_scene(self.all) };
         // As where the camera moves.
         planner.forget();
         Ok(planner.plan(&self.camera, &[self.case.light], &bounds, technique)?)
