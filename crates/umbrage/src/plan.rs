@@ -122,9 +122,10 @@ impl Plan {
     }
 }
 
-/// The largest errors over the receivers that a map serves, pixels per texel. They are upper
+/// The largest errors over the receivers that a map serves, pixels per texel. Boxes that are served
+/// in [groups](crate::Planner::MOST_PARTS) count with the space between them. The errors are upper
 /// bounds: under parallel light they are at most one per cent larger than the true maxima, and
-/// under spot lights this is usually so.
+/// under spot lights by some per cent, or more where receivers come close to the lamp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MapError {
     /// Largest m_s: the error across the warp's axis.

@@ -31,7 +31,7 @@ const TOLERANCE: f64 = 0.01;
 /// Number of halvings after which the remaining bounds are reported as they are. Parallel light
 /// needs dozens; only spot lights near their receivers and views over many orders of magnitude
 /// reach this number.
-const MAX_SPLITS: usize = 250;
+const MAX_SPLITS: usize = 100;
 
 /// The errors and their factors at a corner of a simplex.
 #[derive(Clone, Copy, Debug)]
