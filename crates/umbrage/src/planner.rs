@@ -194,8 +194,9 @@ impl Planner {
         self.limits.check(technique)?;
         bounds.check()?;
         // If this plan fails, the next one keeps nothing.
+        let last_view = self.last.view.take();
         let view = View::of(camera, bounds, technique);
-        let keeps = view.is_some() && self.last.view.take() == view;
+        let keeps = view.is_some() && last_view == view;
         if !keeps {
             self.plan.origin = camera.eye();
             self.plan.pixel_gradient = camera.forward() * camera.pixel_width_per_depth();

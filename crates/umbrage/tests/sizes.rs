@@ -208,7 +208,7 @@ proptest! {
         config in config(),
         lights in proptest::collection::vec((0..3u8, direction()), 2..5),
         others in proptest::collection::vec((0..5usize, 0..3u8, direction()), 1..6),
-        boxes in proptest::bool::ANY,
+        (boxes, fails) in (proptest::bool::ANY, proptest::bool::ANY),
         partition in partition(),
         pick in 0..WARPS.len(),
         size in prop_oneof![Just(Size::Budget(1 << 22)), Just(Size::Exact([300, 200]))],
@@ -230,12 +230,21 @@ proptest! {
         };
         let mut lights: Vec<Light> = lights.into_iter().map(|(kind, d)| light(kind, d)).collect();
         let mut keeping = planner();
+        // A plan for a sky without receivers, which fails at its last light.
+        let sky = umbrage::SeenTiles::new(&config.camera);
+        let sky = umbrage::Seen { tiles: &sky, moving: &[], clearance: 0.0 };
+        let sky = Bounds { seen: Some(sky), ..bounds };
+        let broken = Light::Directional { direction: DVec3::ZERO };
         for (index, kind, direction) in others {
             let light = light(kind, direction);
             let [kept, fresh] = [&mut keeping, &mut planner()].map(|planner| {
                 format!("{:?}", planner.plan(&config.camera, &lights, &bounds, &technique))
             });
             prop_assert_eq!(kept, fresh);
+            if fails {
+                let failing = [&lights[..], &[broken]].concat();
+                keeping.plan(&config.camera, &failing, &sky, &technique).unwrap_err();
+            }
             // Some lights go, some come, some turn into others.
             if index < lights.len() {
                 lights[index] = light;
