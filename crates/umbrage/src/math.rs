@@ -1,6 +1,7 @@
 //! Small functions that several modules share.
 
 use glam::DVec3;
+use std::cmp::Ordering;
 
 /// The smallest and the largest of the values; (∞, −∞) if there are none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
@@ -9,6 +10,33 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
         (if v < lo { v } else { lo }, if v > hi { v } else { hi })
     })
 }
+
+/// A value in a heap that is ordered by a number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Keyed<T> {
+    pub key: f64,
+    pub value: T,
+}
+
+impl<T> Ord for Keyed<T> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.key.total_cmp(&other.key)
+    }
+}
+
+impl<T> PartialOrd for Keyed<T> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<T> PartialEq for Keyed<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl<T> Eq for Keyed<T> {}
 
 /// Larger singular value of the matrix with two columns, from their squared lengths and their dot
 /// product.

@@ -12,7 +12,7 @@ use crate::technique::{Faces, Limits, Technique};
 use crate::visibility::{Filter, LightSize};
 use crate::warp::theta;
 use draft::{Draft, Drafting};
-use finish::{FinishRequest, Finishing};
+use finish::Finishing;
 use opening::Opening;
 use slices::Slicing;
 
@@ -125,12 +125,13 @@ impl View {
     }
 }
 
-/// Checked input for the maps of one light.
+/// Checked input for the maps of all lights.
 #[derive(Clone, Copy)]
 struct Frame<'a> {
     camera: &'a Camera,
     bounds: &'a Bounds<'a>,
     technique: &'a Technique,
+    limits: Limits,
 }
 
 /// Sets the value of an index, which is at most the number of values.
@@ -204,24 +205,24 @@ impl Planner {
             self.last.lights.clear();
             self.focus(camera, bounds);
         }
+        let frame = Frame { camera, bounds, technique, limits: self.limits };
         std::mem::swap(&mut self.units, &mut self.last.units);
         std::mem::swap(&mut self.sizes, &mut self.last.sizes);
         self.units.clear();
         for (index, light) in lights.iter().enumerate() {
             let light = light.checked()?;
             check_light_size(technique, &light)?;
-            self.plan_light(index, light, &Frame { camera, bounds, technique });
+            self.plan_light(index, light, &frame);
         }
         self.last.lights.truncate(lights.len());
-        let Self { limits, plan, drafts, units, sizes, finishing, last, .. } = self;
+        let Self { plan, drafts, units, sizes, finishing, last, .. } = self;
         plan.lights.truncate(lights.len());
         plan.maps.resize_with(units.len(), ShadowMap::default);
-        resolutions(technique, *limits, units, sizes)?;
-        let request = FinishRequest { camera, bounds, technique, limits: *limits };
+        resolutions(technique, frame.limits, units, sizes)?;
         for (i, (map, draft)) in plan.maps.iter_mut().zip(drafts).enumerate() {
             if !(draft.is_kept && last.sizes[i] == sizes[i]) {
                 map.copy_from(&draft.map);
-                finishing.finish(map, draft, sizes[i], &request)?;
+                finishing.finish(map, draft, sizes[i], &frame)?;
             }
             draft.is_kept = true;
         }
@@ -231,7 +232,7 @@ impl Planner {
 
     /// Drafts the maps of one light, or keeps those of the last plan if nothing has changed.
     fn plan_light(&mut self, index: usize, light: Light, frame: &Frame<'_>) {
-        let Frame { camera, bounds, technique } = *frame;
+        let Frame { camera, bounds, technique, .. } = *frame;
         let first = self.units.len();
         let same = self.last.lights.get(index).is_some_and(|last| *last == light);
         if let (true, Some(planned)) = (same, self.plan.lights.get(index)) {

@@ -20,10 +20,10 @@
 use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::Body;
+use crate::math::Keyed;
 use crate::plan::{MapError, Rows, ShadowMap};
 use crate::warp::{Seen, Shape};
 use glam::DVec3;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// The share by which the reported maximum may exceed the true one.
@@ -55,36 +55,16 @@ struct Simplex {
     corners: [u32; 3],
     /// Upper bounds of the errors.
     bound: [f64; 3],
-    /// Largest ratio of a bound to the largest error found when the bound was computed.
-    urgency: f64,
 }
-
-impl Ord for Simplex {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.urgency.total_cmp(&other.urgency)
-    }
-}
-
-impl PartialOrd for Simplex {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Simplex {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Simplex {}
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Buffers {
     corners: Vec<Corner>,
     /// Simplices whose bound exceeds the largest error found by more than the tolerance.
-    open: BinaryHeap<Simplex>,
+    /// Their keys are the largest ratios of a bound to the largest error found when the bounds were
+    /// computed.
+    open: BinaryHeap<Keyed<Simplex>>,
     points: Vec<Point>,
     /// Parts of a cell's edges that may hold the largest error.
     segments: Vec<[Point; 2]>,
@@ -133,7 +113,7 @@ pub(crate) fn worst_errors(
             }
         }
         for _ in 0..MAX_SPLITS {
-            let Some(most_urgent) = search.open.pop() else { break };
+            let Some(Keyed { value: most_urgent, .. }) = search.open.pop() else { break };
             // `best` may have increased since the simplex was pushed.
             if !search.settle(most_urgent.bound) {
                 search.split(&most_urgent);
@@ -142,7 +122,7 @@ pub(crate) fn worst_errors(
     }
     // Simplices that are still open count with their bounds, if these are finite.
     let bounds = search.open.iter().fold(search.settled, |bounds, s| {
-        larger(bounds, s.bound.map(|b| if b.is_finite() { b } else { 0.0 }))
+        larger(bounds, s.value.bound.map(|b| if b.is_finite() { b } else { 0.0 }))
     });
     let pixel = camera.pixel_width_per_depth();
     let [max_s, max_t, max] = larger(search.best, bounds).map(|e| e / pixel);
@@ -255,7 +235,7 @@ fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 struct Search<'a> {
     probe: Probe<'a>,
     corners: &'a mut Vec<Corner>,
-    open: &'a mut BinaryHeap<Simplex>,
+    open: &'a mut BinaryHeap<Keyed<Simplex>>,
     /// The largest errors found.
     best: [f64; 3],
     /// Bounds of the simplices put aside, which exceed `best` by the tolerance at most.
@@ -277,7 +257,7 @@ impl Search<'_> {
         if !self.settle(bound) {
             let urgency =
                 [0, 1, 2].map(|i| bound[i] / self.best[i]).into_iter().fold(0.0, f64::max);
-            self.open.push(Simplex { corners, bound, urgency });
+            self.open.push(Keyed { key: urgency, value: Simplex { corners, bound } });
         }
     }
 

@@ -1,9 +1,9 @@
 //! Finishing: the resolutions of drafted maps and everything that depends on them.
 
+use super::Frame;
 use super::draft::Draft;
 use crate::aliasing::Local;
-use crate::bounds::{Aabb, Bounds};
-use crate::camera::Camera;
+use crate::bounds::Aabb;
 use crate::error::Error;
 use crate::focus::{Body, thickened};
 use crate::math::range;
@@ -11,7 +11,7 @@ use crate::matrices::MARGIN_TEXELS;
 use crate::plan::{ShadowMap, Slab};
 use crate::resolution::enlarged;
 use crate::slab::{all_distances, distances, slab};
-use crate::technique::{Limits, Size, Technique};
+use crate::technique::Size;
 use crate::worst::{self, worst_errors, worst_of_shape};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
@@ -24,15 +24,6 @@ const MOST_CASTER_DEPTHS: f64 = 1000.0;
 /// of casters which keep their depths. Casters nearer to the lamp are clamped, because depth tends
 /// to infinity there.
 const CLOSEST_TO_LAMP: f64 = 16.0;
-
-/// Checked input.
-#[derive(Clone, Copy)]
-pub(super) struct FinishRequest<'a> {
-    pub(super) camera: &'a Camera,
-    pub(super) bounds: &'a Bounds<'a>,
-    pub(super) technique: &'a Technique,
-    pub(super) limits: Limits,
-}
 
 /// Buffers kept from frame to frame.
 #[derive(Clone, Debug, Default)]
@@ -106,9 +97,9 @@ impl Finishing {
         map: &mut ShadowMap,
         draft: &Draft,
         size: [u32; 2],
-        request: &FinishRequest<'_>,
+        frame: &Frame<'_>,
     ) -> Result<(), Error> {
-        let FinishRequest { camera, bounds, technique, limits } = *request;
+        let Frame { camera, bounds, technique, limits } = *frame;
         if draft.body.is_empty() {
             map.resolution = [0, 0];
             return Ok(());

@@ -4,8 +4,8 @@ use super::motion::{self, Motion};
 use super::{BEYOND, Seen, SeenTile, SeenTiles};
 use crate::bounds::Aabb;
 use crate::camera::Camera;
+use crate::math::Keyed;
 use glam::DVec3;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// Largest number of cells around what was seen, and around what may have come into view at the
@@ -101,13 +101,13 @@ struct Pyramid {
     tiles: Vec<Option<SeenTile>>,
     /// Where each level begins in `tiles`, and its number of tiles across and down.
     levels: Vec<(usize, [u32; 2])>,
-    open: BinaryHeap<Candidate>,
+    /// By looseness.
+    open: BinaryHeap<Keyed<Candidate>>,
 }
 
 /// A tile that may be opened.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    looseness: f64,
     level: usize,
     place: [u32; 2],
 }
@@ -152,12 +152,12 @@ impl Pyramid {
         let top = self.levels.len() - 1;
         self.open.clear();
         let candidate = |this: &Self, level: usize, place: [u32; 2]| {
-            let looseness = this.tile(level, place)?.looseness(floor);
-            Some(Candidate { looseness, level, place })
+            let key = this.tile(level, place)?.looseness(floor);
+            Some(Keyed { key, value: Candidate { level, place } })
         };
         self.open.extend(candidate(self, top, [0, 0]));
         let mut given = 0;
-        while let Some(Candidate { level, place, .. }) = self.open.pop() {
+        while let Some(Keyed { value: Candidate { level, place }, .. }) = self.open.pop() {
             // A tile is replaced by four others at most.
             if level == 0 || given + self.open.len() + 4 > most {
                 self.tile(level, place).into_iter().for_each(&mut give);
@@ -177,23 +177,3 @@ fn children([x, y]: [u32; 2], size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> 
     let rows = 2 * y..(2 * y + 2).min(size[1]);
     rows.flat_map(move |y| (2 * x..(2 * x + 2).min(size[0])).map(move |x| [x, y]))
 }
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.looseness.total_cmp(&other.looseness)
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Candidate {}
