@@ -10,6 +10,9 @@ pub(crate) struct Bench {
     pub(crate) device: Device,
     pub(crate) queue: Queue,
     pub(crate) support: Support,
+    /// Whether the device is software, whose texture filters weigh in single precision. Texture
+    /// units have weights of eight bits.
+    pub(crate) is_software: bool,
     complaints: Arc<Mutex<Vec<String>>>,
 }
 
@@ -30,7 +33,8 @@ impl Bench {
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             told.lock().unwrap().push(error.to_string());
         }));
-        Self { device, queue, support, complaints }
+        let is_software = adapter.get_info().device_type == wgpu::DeviceType::Cpu;
+        Self { device, queue, support, is_software, complaints }
     }
 
     /// Waits until all commands are done, and panics if wgpu reported an error.
