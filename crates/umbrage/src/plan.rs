@@ -137,6 +137,14 @@ pub struct MapError {
     pub max: f64,
 }
 
+impl MapError {
+    /// Errors from upper bounds of those in s and in t and of the largest one. The latter may have
+    /// been found apart and more closely; it is never less than the former.
+    pub(crate) fn new([max_s, max_t]: [f64; 2], max: f64) -> Self {
+        Self { max_s, max_t, max: max.max(max_s).max(max_t) }
+    }
+}
+
 /// How the rows of texels are spread over t.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rows {
