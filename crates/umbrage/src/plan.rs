@@ -10,7 +10,8 @@ pub struct Plan {
     /// World position of local space's origin, metres: the viewer's position.
     pub origin: DVec3,
     /// The maps, light by light. Their number depends on the technique and on the number and kinds
-    /// of the lights alone, never on where the camera and the lights are.
+    /// of the lights alone (a [wide](crate::SpotLight::is_wide) spot light is a kind of its own),
+    /// never on where the camera and the lights are.
     pub maps: Vec<ShadowMap>,
     /// The plan of each light, in the order of the lights.
     pub lights: Vec<PlannedLight>,
@@ -39,7 +40,8 @@ pub struct PlannedLight {
 pub struct Part {
     /// Index of the light.
     pub light: usize,
-    /// Side of the cube around a point light; `None` for other lights.
+    /// Side of the cube around a point light or a [wide](crate::SpotLight::is_wide) spot light;
+    /// `None` for other lights.
     pub side: Option<CubeSide>,
     /// Face of the view frustum; `None` stands for the whole frustum.
     pub face: Option<Face>,
@@ -62,7 +64,7 @@ pub enum Face {
     Near,
 }
 
-/// A side of the cube around a point light, named by the world axis that points through it.
+/// A side of the cube around a point light or a wide spot light, named by the world axis that points through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they say it all")]
 pub enum CubeSide {

@@ -21,7 +21,7 @@ use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::Body;
 use crate::math::Keyed;
-use crate::plan::{MapError, Rows, ShadowMap};
+use crate::plan::{MapError, Rows, ShadowMap, Slab};
 use crate::warp::{Seen, Shape};
 use glam::DVec3;
 use std::collections::BinaryHeap;
@@ -343,6 +343,26 @@ impl Probe<'_> {
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
     }
 
+    /// The axis of the map's light, if it is a lamp.
+    fn axis(&self) -> Option<DVec3> {
+        match self.map.slab {
+            Slab::Distances { axis, .. } => Some(axis),
+            Slab::Leaning { .. } => None,
+        }
+    }
+
+    /// `mean`, if its dot product with the corners' vectors is positive at all corners, or else
+    /// `other`, which is less close to them.
+    fn towards_all(
+        mean: DVec3,
+        corners: &[Corner],
+        vector: &dyn Fn(&Corner) -> DVec3,
+        other: impl FnOnce() -> DVec3,
+    ) -> DVec3 {
+        let is_good = corners.iter().all(|c| vector(c).dot(mean) > 0.0);
+        if is_good { mean } else { other() }
+    }
+
     /// Upper bounds over the convex hull of some corners of the errors in s, in t and in the worst
     /// direction; 0 for those that are not asked for.
     fn bound(&self, corners: &[Corner]) -> [f64; 3] {
@@ -351,7 +371,12 @@ impl Probe<'_> {
         // m_t = w²/|N|, where N = w² ∇t is affine. |N| is at least its component along any
         // fixed direction, and the ratio of w to that component is again largest at a corner. (With
         // logarithmic rows this ratio has light space's own w as a further factor.)
-        let normal = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
+        let mean = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
+        let normal = Self::towards_all(mean, corners, &|c| c.normal_t, || {
+            // Under a lamp N = w² ∇t lies within 90° of light space's z for a one-point warp.
+            let t = self.map.shadow_from_local.row(1).truncate();
+            self.axis().map_or(t, |axis| t - axis * axis.dot(t)).normalize_or_zero()
+        });
         let t = || {
             w_over_z
                 * max(&|c| {
@@ -372,7 +397,10 @@ impl Probe<'_> {
                 // ‖A‖/z = w ‖r × K‖/(|r| z), and |r| is at least its component along a
                 // fixed direction. The bound may combine that component with w or with ‖r ×
                 // K‖.
-                let middle = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
+                let mean = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
+                let middle = Self::towards_all(mean, corners, &|c| c.p - apex, || {
+                    self.axis().unwrap_or(mean)
+                });
                 let per_share = |value: &dyn Fn(&Corner) -> f64| {
                     max(&|c| {
                         let share = (c.p - apex).dot(middle);

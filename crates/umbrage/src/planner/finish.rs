@@ -109,9 +109,9 @@ impl Finishing {
         // The largest errors in s and t are inversely proportional to the resolution, unless the
         // map is stable, whose matrices depend on it.
         let unit = match (shape, stable) {
-            (None, None) => draft
-                .largest_errors
-                .unwrap_or_else(|| worst_in_s_and_t(map, body, camera, worst)),
+            (None, None) => {
+                draft.largest_errors.unwrap_or_else(|| worst_in_s_and_t(map, body, camera, worst))
+            }
             _ => [0.0; 2],
         };
         let mut margin = 0.0;
