@@ -1,5 +1,6 @@
 use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
+use crate::error::Error;
 use crate::visibility::Filter;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
 use std::ops::Range;
@@ -324,6 +325,35 @@ fn metric(s: DVec3, t: DVec3) -> [f64; 3] {
 }
 
 impl ShadowMap {
+    /// Whether all numbers of the map are finite, or an error about the map of index `index`.
+    pub(crate) fn check_finite(&self, index: usize) -> Result<(), Error> {
+        let Self { cell, fade_from, caster_planes, error, slab, .. } = self;
+        let mut planes = cell.iter().chain(fade_from).chain(caster_planes);
+        let slab = match *slab {
+            Slab::Leaning { slope, begin, thickness } => {
+                slope.is_finite() && (begin + thickness).is_finite()
+            }
+            Slab::Distances { axis, near, far } => axis.is_finite() && (near + far).is_finite(),
+        };
+        let rows = match self.rows {
+            Rows::Even => true,
+            Rows::Logarithmic { ratio } => ratio.is_finite(),
+        };
+        let parts = [
+            ("matrix", self.shadow_from_local.is_finite() && self.local_from_shadow.is_finite()),
+            ("spacing of rows", rows && self.lambda.is_none_or(f64::is_finite)),
+            ("range of distances", self.split.iter().all(|d| d.is_finite())),
+            ("planes", planes.all(|p| p.normal.is_finite() && p.offset.is_finite())),
+            ("largest error", (error.max_s + error.max_t + error.max).is_finite()),
+            ("storage factor", self.storage_factor.is_finite()),
+            ("slab", slab),
+        ];
+        match parts.into_iter().find(|(_, is_finite)| !is_finite) {
+            Some((what, _)) => Err(Error::NotFinite { map: index, what }),
+            None => Ok(()),
+        }
+    }
+
     /// Whether the map serves no receivers. An empty map has no texels.
     pub fn is_empty(&self) -> bool {
         self.resolution.contains(&0)

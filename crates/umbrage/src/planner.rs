@@ -188,8 +188,9 @@ impl Planner {
     /// Where the camera sees no receivers, or none within a light, the maps are empty.
     ///
     /// # Errors
-    /// Names the first field of technique, limits, lights or bounds that is out of its range. The
-    /// planner can be used again after an error.
+    /// Names the first field of technique, limits, lights or bounds that is out of its range.
+    /// [`Error::NotFinite`] if a number of the plan would not be finite, although all fields are in
+    /// their ranges. The planner can be used again after an error.
     pub fn plan(
         &mut self,
         camera: &Camera,
@@ -229,6 +230,7 @@ impl Planner {
             if !(draft.is_kept && last.sizes[i] == sizes[i]) {
                 map.copy_from(&draft.map);
                 finishing.finish(map, draft, sizes[i], &frame)?;
+                map.check_finite(i)?;
             }
             draft.is_kept = true;
         }
