@@ -97,6 +97,15 @@ fn case() -> impl Strategy<Value = Case> {
     })
 }
 
+/// What comes of a case that is planned without a fault.
+enum Outcome {
+    Sound,
+    /// The size asked for is too small for the maps, or larger than the limits allow.
+    TooSmall,
+    /// The plan's numbers would not be finite, which an error tells.
+    NotFinite,
+}
+
 impl Case {
     /// Points which the camera sees in the light and which are among the receivers.
     fn seen_points(&self) -> Vec<glam::DVec3> {
@@ -113,9 +122,8 @@ impl Case {
         points
     }
 
-    /// Plans the case and checks the plan. Returns whether there is one; if not, the size does not
-    /// permit it.
-    fn check(&self, planner: &mut Planner) -> Result<bool, Fault> {
+    /// Plans the case and checks the plan.
+    fn check(&self, planner: &mut Planner) -> Result<Outcome, Fault> {
         let Self { config, technique, .. } = self;
         let Config { camera, light, .. } = config;
         let tree = self.parts.as_ref().map(|parts| BoxTree::new(parts).expect("valid boxes"));
@@ -124,7 +132,8 @@ impl Case {
             |technique: &Technique| planner.plan(camera, &[*light], &bounds, technique).cloned();
         let plan = match planned(technique) {
             Ok(plan) => plan,
-            Err(Error::Invalid { field: "technique.size", .. }) => return Ok(false),
+            Err(Error::Invalid { field: "technique.size", .. }) => return Ok(Outcome::TooSmall),
+            Err(Error::NotFinite { .. }) => return Ok(Outcome::NotFinite),
             Err(error) => return Err(Fault { kind: "error", what: error.to_string() }),
         };
         let maps = map_count(&technique.partition, light);
@@ -147,7 +156,7 @@ impl Case {
                 }
             }
         }
-        Ok(true)
+        Ok(Outcome::Sound)
     }
 }
 
@@ -157,25 +166,31 @@ fn plan_at_random(cases: usize) {
     let strategy = case();
     let mut planners: BTreeMap<[u32; 2], Planner> = BTreeMap::new();
     let mut faults: BTreeMap<&str, (usize, String)> = BTreeMap::new();
-    let [mut planned, mut too_small] = [0; 2];
+    let [mut sound, mut too_small, mut not_finite] = [0; 3];
     for _ in 0..cases {
         let case = strategy.new_tree(&mut runner).expect("a case").current();
         let Limits { max_side, align } = case.limits;
         let planner =
             planners.entry([max_side, align]).or_insert_with(|| Planner::with_limits(case.limits));
         match case.check(planner) {
-            Ok(true) => planned += 1,
-            Ok(false) => too_small += 1,
+            Ok(Outcome::Sound) => sound += 1,
+            Ok(Outcome::TooSmall) => too_small += 1,
+            Ok(Outcome::NotFinite) => not_finite += 1,
             Err(Fault { kind, what }) => {
                 let first = || (0, format!("{what}\n    {case:?}"));
                 faults.entry(kind).or_insert_with(first).0 += 1;
             }
         }
     }
-    println!("{cases} cases: {planned} sound plans, {too_small} refused for their size");
+    println!(
+        "{cases} cases: {sound} sound plans, {too_small} refused for their size, {not_finite} \
+         because numbers would not be finite"
+    );
     for (kind, (count, first)) in &faults {
         println!("{count} × {kind}, first {first}");
     }
+    // Such an error is right for hardly any case.
+    assert!(not_finite <= cases / 10_000, "{not_finite} errors");
     assert!(faults.is_empty(), "{:?}", faults.keys());
 }
 
