@@ -101,15 +101,17 @@ impl ViewUniform {
         let clip_from_render = DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
         let (light_kind, direction, position, light_range, cosine) = match light {
             Light::Directional { direction } => {
-                (0, direction.normalize_or_zero(), DVec3::ZERO, f64::MAX, 0.0)
+                (0, direction.normalize_or_zero(), DVec3::ZERO, f64::MAX, -1.0)
             }
             Light::Spot(spot) => {
                 let axis = spot.direction.normalize_or_zero();
                 let position = spot.position - camera.eye();
-                (1, axis, position, spot.range, spot.half_angle_rad.cos())
+                // A wide spot light is a part of a point light.
+                let kind = if spot.is_wide() { 2 } else { 1 };
+                (kind, axis, position, spot.range, spot.half_angle_rad.cos())
             }
             Light::Point(point) => {
-                (2, DVec3::ZERO, point.position - camera.eye(), point.range, 0.0)
+                (2, DVec3::ZERO, point.position - camera.eye(), point.range, -1.0)
             }
         };
         let color = |c: Vec3| c.extend(0.0);

@@ -2,7 +2,7 @@ use crate::{Error, Progress, Ray, Surface, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
-use umbrage::{Camera, Light, PointLight, SpotLight};
+use umbrage::{Camera, Light};
 
 /// Approximate number of samples held in memory at a time, which take some 100 MB.
 const BAND_SAMPLES: u64 = 1 << 19;
@@ -156,7 +156,7 @@ impl<'a> View<'a> {
     ///
     /// Every surface between a spot or point light and the sample casts, the light's own housing
     /// included. Samples nearer to the light than its `near` distance are never in shadow, as
-    /// documented at [`SpotLight`] and [`PointLight`].
+    /// documented at [`SpotLight`](umbrage::SpotLight) and [`PointLight`](umbrage::PointLight).
     pub fn truth(&self, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
@@ -164,9 +164,8 @@ impl<'a> View<'a> {
         let position = sample.surface.position;
         let (direction, end) = match self.light {
             Light::Directional { direction } => (-direction, f64::INFINITY),
-            Light::Spot(spot) if spot_depth(&spot, position) < spot.near => return 1.0,
+            _ if !self.light.casts_at(position) => return 1.0,
             Light::Spot(spot) => (spot.position - position, 1.0),
-            Light::Point(point) if cube_depth(&point, position) < point.near => return 1.0,
             Light::Point(point) => (point.position - position, 1.0),
         };
         let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
@@ -212,28 +211,5 @@ impl Band {
 }
 
 fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
-    let to_light = light.direction_to_light(position);
-    if normal.dot(to_light) <= 0.0 {
-        return false;
-    }
-    match light {
-        Light::Directional { .. } => true,
-        Light::Spot(spot) => {
-            let axis = spot.direction.normalize_or_zero();
-            spot_depth(spot, position) <= spot.range
-                && -axis.dot(to_light) >= spot.half_angle_rad.cos()
-        }
-        Light::Point(point) => position.distance(point.position) <= point.range,
-    }
-}
-
-/// Distance from a point light along the world axis that is nearest to the direction of `position`,
-/// metres.
-fn cube_depth(point: &PointLight, position: DVec3) -> f64 {
-    (position - point.position).abs().max_element()
-}
-
-/// Distance from a spot light along its axis, metres.
-fn spot_depth(spot: &SpotLight, position: DVec3) -> f64 {
-    spot.direction.normalize_or_zero().dot(position - spot.position)
+    normal.dot(light.direction_to_light(position)) > 0.0 && light.reaches(position)
 }

@@ -65,16 +65,7 @@ pub fn radiance(light: &Light, sample: &Sample, visibility: f32) -> Vec3 {
 /// The factor by which a spot or point light fades smoothly to nothing at the end of its range: the
 /// window of Karis, Real Shading in Unreal Engine 4, 2013, Eq. 9, without the inverse square.
 fn attenuation(light: &Light, position: DVec3) -> f32 {
-    match light {
-        Light::Directional { .. } => 1.0,
-        Light::Spot(spot) => {
-            // A spot light's range counts along its axis, here as in `is_facing`.
-            let axis = spot.direction.normalize_or_zero();
-            let relative = axis.dot(position - spot.position) / spot.range;
-            window(relative)
-        }
-        Light::Point(point) => window(position.distance(point.position) / point.range),
-    }
+    window(light.share_of_range(position))
 }
 
 /// 1 at the light, 0 where its range ends.

@@ -8,6 +8,10 @@ use glam::{DVec2, DVec3};
 /// The largest distance between a plane and the body it bounds, as a share of the body's size.
 const TOUCH: f64 = 1e-6;
 
+/// The largest angle, radians, by which rounding turns a plane through a lamp away from a body that
+/// it bounds.
+const ASKEW: f64 = 1e-6;
+
 /// Appends planes around all that can cast onto `body`, which is the body swept towards the light:
 /// those planes of `around` that touch the body and whose inside lies towards the light, and one
 /// plane through every edge of the body's outline as the light sees it. `bounds` is the body's bounding
@@ -46,11 +50,13 @@ pub(crate) fn caster_planes(
         let length = plane.truncate().length();
         if length > 0.0 {
             let plane = plane / length;
-            let plane = widen(Plane { normal: plane.truncate(), offset: plane.w });
+            let plane = Plane { normal: plane.truncate(), offset: plane.w };
             // The direction of an edge as short as rounding is arbitrary. No plane is better than a
-            // wrong one.
-            if (0..outline.len()).all(|i| plane.distance(corner(i)) >= 0.0) {
-                planes.push(plane);
+            // wrong one. Corners near a lamp tell as much about a direction as those far from it.
+            let allowed = |p: DVec3| space.apex.map_or(slack, |apex| ASKEW * p.distance(apex));
+            let is_right = |p: DVec3| plane.distance(p) >= -allowed(p);
+            if (0..outline.len()).map(corner).all(is_right) {
+                planes.push(widen(plane));
             }
         }
     }

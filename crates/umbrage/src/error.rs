@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-/// Why a plan's input is invalid.
+/// Why there is no plan for an input.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -11,6 +11,16 @@ pub enum Error {
         field: &'static str,
         /// What is wrong with the value and which values are right.
         problem: Cow<'static, str>,
+    },
+    /// A plan's number would not be finite, although each field is in its range.
+    #[error(
+        "the {what} of map {map} would not be finite: the view, the light or the receivers are too extreme together"
+    )]
+    NotFinite {
+        /// Index of the map.
+        map: usize,
+        /// What the number belongs to.
+        what: &'static str,
     },
 }
 

@@ -32,23 +32,81 @@ pub struct PointLight {
     pub range: f64,
 }
 
-/// A cone of light from one point.
+/// A cone of light from one point. A [wide](Self::is_wide) one is a part of a [`PointLight`]: it has
+/// the six maps of one, and its distances count as those of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
     /// Position in world space, metres.
     pub position: DVec3,
     /// Axis of the cone: the direction in which the light travels, of any non-zero length.
     pub direction: DVec3,
-    /// Half the cone's opening angle, radians, in (0, 85°]. Points outside the cone are not lit.
+    /// Half the cone's opening angle, radians, in (0, 90°]. Points outside the cone are not lit.
     pub half_angle_rad: f64,
     /// Distance from the light along the axis at which shadows begin, metres, ≥ 1e-12. Receivers
     /// nearer than this get no shadow; casters nearer than this cast shadows onto receivers beyond.
+    /// For a wide light it is the distance along the nearest world axis.
     pub near: f64,
-    /// Distance along the axis at which the light ends, metres, > `near`.
+    /// Distance along the axis at which the light ends, metres, > `near`. For a wide light it is the
+    /// distance from the light.
     pub range: f64,
 }
 
+impl SpotLight {
+    /// The largest half angle of a spot light with one map, radians: 75°. One map of a wider cone
+    /// would need six times the texels of six maps for the same error at the cone's axis: their
+    /// number grows as the square of the half angle's tangent, without end at 90°.
+    pub const LARGEST_OF_ONE_MAP_RAD: f64 = 75.0 * std::f64::consts::PI / 180.0;
+
+    /// Whether the cone is too wide for one map, so that the light has six, as a point light.
+    pub fn is_wide(&self) -> bool {
+        self.half_angle_rad > Self::LARGEST_OF_ONE_MAP_RAD
+    }
+
+    /// Distance of a world point along the axis, metres.
+    fn depth(&self, world_position: DVec3) -> f64 {
+        self.direction.normalize_or_zero().dot(world_position - self.position)
+    }
+}
+
 impl Light {
+    /// Whether shadows fall at a world point: whether the point lies no nearer to the light than
+    /// the light's `near` distance.
+    pub fn casts_at(&self, world_position: DVec3) -> bool {
+        let along_axes = |position: DVec3| (world_position - position).abs().max_element();
+        match self {
+            Self::Directional { .. } => true,
+            Self::Spot(spot) if spot.is_wide() => along_axes(spot.position) >= spot.near,
+            Self::Spot(spot) => spot.depth(world_position) >= spot.near,
+            Self::Point(point) => along_axes(point.position) >= point.near,
+        }
+    }
+
+    /// Distance of a world point from the light as a share of the light's `range`: the light ends
+    /// at 1. It is 0 under parallel light.
+    pub fn share_of_range(&self, world_position: DVec3) -> f64 {
+        match self {
+            Self::Directional { .. } => 0.0,
+            Self::Spot(spot) if spot.is_wide() => {
+                world_position.distance(spot.position) / spot.range
+            }
+            Self::Spot(spot) => spot.depth(world_position) / spot.range,
+            Self::Point(point) => world_position.distance(point.position) / point.range,
+        }
+    }
+
+    /// Whether the light reaches a world point where nothing lies between them: whether the point
+    /// lies within the light's range and, under a spot light, within its cone.
+    pub fn reaches(&self, world_position: DVec3) -> bool {
+        let is_in_cone = match self {
+            Self::Spot(spot) => {
+                let axis = spot.direction.normalize_or_zero();
+                -axis.dot(self.direction_to_light(world_position)) >= spot.half_angle_rad.cos()
+            }
+            _ => true,
+        };
+        is_in_cone && self.share_of_range(world_position) <= 1.0
+    }
+
     /// Unit vector from a world point towards the light. At the position of a spot light it is
     /// opposite to the axis, at that of a point light +y.
     pub fn direction_to_light(&self, world_position: DVec3) -> DVec3 {
@@ -63,30 +121,45 @@ impl Light {
         }
     }
 
-    /// The projections that make up the light, each with its own maps: six pyramids for a point
-    /// light, one projector for any other light. The light must have been [checked](Self::checked).
-    pub(crate) fn projectors(self) -> impl Iterator<Item = (Option<CubeSide>, Projector)> {
-        let is_point = matches!(self, Self::Point(_));
-        (0..if is_point { 6 } else { 1 }).map(move |i| {
-            let side = is_point.then(|| CubeSide::ALL[i]);
-            let projector = match self {
-                Self::Directional { direction } => Projector::Directional { direction },
-                Self::Spot(SpotLight { position, direction, half_angle_rad, near, range }) => {
-                    Projector::Pyramid {
+    /// The sides of the cube through which the light's maps look, one for each projector; `None`
+    /// for the projector of a light without a cube.
+    pub(crate) fn sides(&self) -> &'static [Option<CubeSide>] {
+        use CubeSide::{NegX, NegY, NegZ, PosX, PosY, PosZ};
+        match self {
+            Self::Spot(spot) if !spot.is_wide() => &[None],
+            Self::Directional { .. } => &[None],
+            Self::Spot(_) | Self::Point(_) => {
+                &[Some(PosX), Some(NegX), Some(PosY), Some(NegY), Some(PosZ), Some(NegZ)]
+            }
+        }
+    }
+
+    /// The projection through one of the light's [sides](Self::sides). The light must have been
+    /// [checked](Self::checked).
+    pub(crate) fn projector(&self, side: Option<CubeSide>) -> Projector {
+        match *self {
+            Self::Directional { direction } => Projector::Directional { direction },
+            Self::Spot(SpotLight { position, direction, half_angle_rad, near, range }) => {
+                let slope = half_angle_rad.tan();
+                match side.map(CubeSide::direction) {
+                    None => {
+                        Projector::Pyramid { position, direction, slope, near, range, cone: None }
+                    }
+                    Some(through) => Projector::Pyramid {
                         position,
-                        direction,
-                        slope: half_angle_rad.tan(),
+                        direction: through,
+                        slope: 1.0,
                         near,
                         range,
-                    }
+                        cone: Some(Cone { axis: direction, slope }),
+                    },
                 }
-                Self::Point(PointLight { position, near, range }) => {
-                    let direction = side.map_or(DVec3::Y, CubeSide::direction);
-                    Projector::Pyramid { position, direction, slope: 1.0, near, range }
-                }
-            };
-            (side, projector)
-        })
+            }
+            Self::Point(PointLight { position, near, range }) => {
+                let direction = side.map_or(DVec3::Y, CubeSide::direction);
+                Projector::Pyramid { position, direction, slope: 1.0, near, range, cone: None }
+            }
+        }
     }
 
     /// The same light with unit directions, or an error that names the field at fault.
@@ -106,11 +179,11 @@ impl Light {
             }
             Self::Spot(spot) => {
                 check_point(spot.position, spot.near, spot.range)?;
-                let max = 85f64.to_radians();
+                let max = std::f64::consts::FRAC_PI_2;
                 check(
                     spot.half_angle_rad > 0.0 && spot.half_angle_rad <= max,
                     "light.half_angle_rad",
-                    || format!("must lie in (0, {max:.4}] (85°), is {}", spot.half_angle_rad),
+                    || format!("must lie in (0, π/2] (90°), is {}", spot.half_angle_rad),
                 )?;
                 let direction = unit(spot.direction, "light.direction")?;
                 Ok(Self::Spot(SpotLight { direction, ..spot }))
@@ -147,20 +220,34 @@ pub(crate) enum Projector {
         direction: DVec3,
     },
     /// Light from one point into a pyramid with a square base. `slope` is half the width of the
-    /// base over the height.
+    /// base over the height. Only what lies within the cone, if there is one, is lit.
     Pyramid {
         position: DVec3,
         direction: DVec3,
         slope: f64,
         near: f64,
         range: f64,
+        cone: Option<Cone>,
     },
 }
 
-/// A pyramid's near distance, increased where it would vanish by rounding among coordinates as
-/// large as `size`, metres: no map is defined at the apex itself.
+/// A cone of light around an axis of unit length, with the tangent of its half angle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cone {
+    axis: DVec3,
+    slope: f64,
+}
+
+/// The half-spaces of a pyramid around an axis, whose sides rise by `slope` from the axis.
+fn side_planes(apex: DVec3, axis: DVec3, slope: f64) -> [Plane; 4] {
+    let [a, b] = perpendicular_pair(axis);
+    [a, -a, b, -b].map(|d| Plane::through(apex, (axis * slope + d).normalize()))
+}
+
+/// A pyramid's near distance, increased where too few of its digits would be left among coordinates
+/// as large as `size`, metres: nearer to the apex, corners have no certain direction from it.
 fn near_end(near: f64, apex: DVec3, size: f64) -> f64 {
-    near.max(1e-11 * apex.length().max(size))
+    near.max(1e-9 * apex.length().max(size))
 }
 
 impl Projector {
@@ -173,34 +260,32 @@ impl Projector {
         }
     }
 
-    /// A pyramid's four side planes, then its near and its far plane, relative to `origin` (world
-    /// space); `None` for parallel light. `size` is the largest coordinate of what the planes are
-    /// to clip, metres.
-    pub(crate) fn frustum(&self, origin: DVec3, size: f64) -> Option<[Plane; 6]> {
-        let Self::Pyramid { position, direction: axis, slope, near, range } = *self else {
-            return None;
-        };
+    /// Sets the planes around a pyramid, relative to `origin` (world space); none for parallel
+    /// light. `size` is the largest coordinate of what the planes are to clip, metres.
+    pub(crate) fn frustum(&self, planes: &mut Vec<Plane>, origin: DVec3, size: f64) {
+        planes.clear();
+        let Self::Pyramid { position, direction, slope, near, range, cone } = *self else { return };
         let apex = position - origin;
-        let (a, b) = perpendicular_pair(axis).into();
-        let side = |d: DVec3| Plane::through(apex, (axis * slope + d).normalize());
-        Some([
-            side(a),
-            side(-a),
-            side(b),
-            side(-b),
-            Plane::through(apex + axis * near_end(near, apex, size), axis),
-            Plane::through(apex + axis * range, -axis),
-        ])
+        let near = near_end(near, apex, size);
+        planes.extend(side_planes(apex, direction, slope));
+        planes.push(Plane::through(apex + direction * near, direction));
+        planes.push(Plane::through(apex + direction * range, -direction));
+        if let Some(Cone { axis, slope }) = cone {
+            // What the cone's border just touches must not be lost by rounding. The planes are
+            // moved by less than the near distance, so that no side behind the light is lit.
+            let widen = |p: Plane| Plane { offset: p.offset + 0.5 * near, ..p };
+            planes.extend(side_planes(apex, axis, slope).map(widen));
+        }
     }
 
     /// Corners of a pyramid at its near and its far plane, relative to `origin` (world space);
     /// `None` for parallel light.
     pub(crate) fn corners(&self, origin: DVec3) -> Option<[DVec3; 8]> {
-        let Self::Pyramid { position, direction, slope, near, range } = *self else {
+        let Self::Pyramid { position, direction, slope, near, range, .. } = *self else {
             return None;
         };
         let apex = position - origin;
-        let (a, b) = perpendicular_pair(direction).into();
+        let [a, b] = perpendicular_pair(direction);
         Some(std::array::from_fn(|i| {
             let sign = |bit: usize| if i >> bit & 1 == 1 { slope } else { -slope };
             let depth = if i >> 2 & 1 == 1 { range } else { near_end(near, apex, 0.0) };

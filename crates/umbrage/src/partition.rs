@@ -34,6 +34,10 @@ pub(crate) struct LitFaces {
 /// nothing.
 const EDGE_ON: f64 = 1e-12;
 
+/// The distance between eye and lamp, as a share of the near distance, below which the lamp counts
+/// as being at the eye.
+const AT_EYE: f64 = 1e-3;
+
 impl LitFaces {
     pub(crate) fn new(camera: &Camera, projector: &Projector, with_near: bool) -> Self {
         let light = homogeneous(projector, camera);
@@ -95,10 +99,13 @@ impl LitFaces {
     }
 }
 
-/// The light as a homogeneous local point.
+/// The light as a homogeneous local point. A lamp at the eye has no direction, and sees all faces
+/// edge-on. It counts as a lamp behind the eye, which divides the view as well as any other.
 fn homogeneous(projector: &Projector, camera: &Camera) -> DVec4 {
+    let near = camera.near();
     match projector.direction_and_apex(camera.eye()) {
         (direction, None) => -direction.extend(0.0),
+        (_, Some(apex)) if apex.length() < AT_EYE * near => (camera.forward() * -near).extend(1.0),
         (_, Some(apex)) => apex.extend(1.0),
     }
 }

@@ -1,5 +1,6 @@
 use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
+use crate::error::Error;
 use crate::visibility::Filter;
 use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
 use std::ops::Range;
@@ -10,7 +11,8 @@ pub struct Plan {
     /// World position of local space's origin, metres: the viewer's position.
     pub origin: DVec3,
     /// The maps, light by light. Their number depends on the technique and on the number and kinds
-    /// of the lights alone, never on where the camera and the lights are.
+    /// of the lights alone (a [wide](crate::SpotLight::is_wide) spot light is a kind of its own),
+    /// never on where the camera and the lights are.
     pub maps: Vec<ShadowMap>,
     /// The plan of each light, in the order of the lights.
     pub lights: Vec<PlannedLight>,
@@ -39,7 +41,8 @@ pub struct PlannedLight {
 pub struct Part {
     /// Index of the light.
     pub light: usize,
-    /// Side of the cube around a point light; `None` for other lights.
+    /// Side of the cube around a point light or a [wide](crate::SpotLight::is_wide) spot light;
+    /// `None` for other lights.
     pub side: Option<CubeSide>,
     /// Face of the view frustum; `None` stands for the whole frustum.
     pub face: Option<Face>,
@@ -62,7 +65,7 @@ pub enum Face {
     Near,
 }
 
-/// A side of the cube around a point light, named by the world axis that points through it.
+/// A side of the cube around a point light or a wide spot light, named by the world axis that points through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they say it all")]
 pub enum CubeSide {
@@ -135,6 +138,14 @@ pub struct MapError {
     /// Largest error in the worst direction: the larger singular value of a texel's footprint over
     /// a pixel's width.
     pub max: f64,
+}
+
+impl MapError {
+    /// Errors from upper bounds of those in s and in t and of the largest one. The latter may have
+    /// been found apart and more closely; it is never less than the former.
+    pub(crate) fn new([max_s, max_t]: [f64; 2], max: f64) -> Self {
+        Self { max_s, max_t, max: max.max(max_s).max(max_t) }
+    }
 }
 
 /// How the rows of texels are spread over t.
@@ -314,6 +325,35 @@ fn metric(s: DVec3, t: DVec3) -> [f64; 3] {
 }
 
 impl ShadowMap {
+    /// Whether all numbers of the map are finite, or an error about the map of index `index`.
+    pub(crate) fn check_finite(&self, index: usize) -> Result<(), Error> {
+        let Self { cell, fade_from, caster_planes, error, slab, .. } = self;
+        let mut planes = cell.iter().chain(fade_from).chain(caster_planes);
+        let slab = match *slab {
+            Slab::Leaning { slope, begin, thickness } => {
+                slope.is_finite() && (begin + thickness).is_finite()
+            }
+            Slab::Distances { axis, near, far } => axis.is_finite() && (near + far).is_finite(),
+        };
+        let rows = match self.rows {
+            Rows::Even => true,
+            Rows::Logarithmic { ratio } => ratio.is_finite(),
+        };
+        let parts = [
+            ("matrix", self.shadow_from_local.is_finite() && self.local_from_shadow.is_finite()),
+            ("spacing of rows", rows && self.lambda.is_none_or(f64::is_finite)),
+            ("range of distances", self.split.iter().all(|d| d.is_finite())),
+            ("planes", planes.all(|p| p.normal.is_finite() && p.offset.is_finite())),
+            ("largest error", (error.max_s + error.max_t + error.max).is_finite()),
+            ("storage factor", self.storage_factor.is_finite()),
+            ("slab", slab),
+        ];
+        match parts.into_iter().find(|(_, is_finite)| !is_finite) {
+            Some((what, _)) => Err(Error::NotFinite { map: index, what }),
+            None => Ok(()),
+        }
+    }
+
     /// Whether the map serves no receivers. An empty map has no texels.
     pub fn is_empty(&self) -> bool {
         self.resolution.contains(&0)

@@ -75,6 +75,8 @@ pub struct Planner {
     cells: Cells,
     /// Planes around everything that the camera sees.
     around: Vec<Plane>,
+    /// Planes around a pyramid of light; none under parallel light.
+    pyramid: Vec<Plane>,
     /// Planes around the part of a light's view that a face of the frustum serves.
     cell: Vec<Plane>,
     slicing: Slicing,
@@ -82,6 +84,10 @@ pub struct Planner {
     finishing: Finishing,
     last: Last,
 }
+
+/// The size of a box of receivers, as a share of that of the view frustum, below which the box is
+/// cut by the frustum and not the frustum by the box.
+const SMALL: f64 = 0.01;
 
 /// Bodies of receivers, each cut out of the one before.
 #[derive(Clone, Debug, Default)]
@@ -182,8 +188,9 @@ impl Planner {
     /// Where the camera sees no receivers, or none within a light, the maps are empty.
     ///
     /// # Errors
-    /// Names the first field of technique, limits, lights or bounds that is out of its range. The
-    /// planner can be used again after an error.
+    /// Names the first field of technique, limits, lights or bounds that is out of its range.
+    /// [`Error::NotFinite`] if a number of the plan would not be finite, although all fields are in
+    /// their ranges. The planner can be used again after an error.
     pub fn plan(
         &mut self,
         camera: &Camera,
@@ -223,6 +230,7 @@ impl Planner {
             if !(draft.is_kept && last.sizes[i] == sizes[i]) {
                 map.copy_from(&draft.map);
                 finishing.finish(map, draft, sizes[i], &frame)?;
+                map.check_finite(i)?;
             }
             draft.is_kept = true;
         }
@@ -241,12 +249,10 @@ impl Planner {
                 return;
             }
         }
-        for (side, projector) in light.projectors() {
+        for &side in light.sides() {
             let part = Part { light: index, side, ..Part::default() };
-            self.draft_projector(
-                part,
-                &Request { camera, projector: &projector, bounds, technique },
-            );
+            let projector = &light.projector(side);
+            self.draft_projector(part, &Request { camera, projector, bounds, technique });
         }
         let theta_rad = self.theta(&light, camera);
         let planned = PlannedLight { maps: first..self.units.len(), theta_rad };
@@ -264,11 +270,20 @@ impl Planner {
         self.around.extend(frustum_planes(camera));
         if let Some(receivers) = bounds.receivers {
             let sides = view.sides(local(receivers));
-            self.around.extend(sides);
-            if receivers.is_empty() {
+            // Vertices cut out of a body lose as many digits as its size takes up, so the smaller
+            // of frustum and box is cut.
+            let aabb = thickened(local(receivers), view.size()).intersection(view.bounds());
+            let reach = aabb.min.abs().max(aabb.max.abs()).max_element();
+            if aabb.is_empty() {
                 view.clear();
+            } else if reach < SMALL * view.size() {
+                view.clear();
+                view.push_box(aabb);
+                view.clip(&self.around);
+            } else {
+                view.clip(&sides);
             }
-            view.clip(&sides);
+            self.around.extend(sides);
         }
         let seen_bounds = view.bounds();
         if let Some(tree) = bounds.receiver_parts {
@@ -312,10 +327,11 @@ impl Planner {
     /// Appends the maps of one projector, without their resolutions and what depends on these.
     fn draft_projector(&mut self, part: Part, request: &Request<'_>) {
         let Request { camera, projector, technique, .. } = *request;
-        let Bodies { view, lit, .. } = &mut self.bodies;
-        let pyramid = projector.frustum(camera.eye(), view.size());
-        if let Some(planes) = &pyramid {
-            lit.set_clipped(view, planes);
+        let Self { bodies: Bodies { view, lit, .. }, pyramid, .. } = self;
+        projector.frustum(pyramid, camera.eye(), view.size());
+        let is_pyramid = !pyramid.is_empty();
+        if is_pyramid {
+            lit.set_clipped(view, pyramid);
         }
         let with_near = technique.partition.faces == Faces::SidesAndNear;
         let faces = partition::LitFaces::new(camera, projector, with_near);
@@ -327,13 +343,13 @@ impl Planner {
             self.cell.clear();
             let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
             let Bodies { view, lit, face: body } = &mut self.bodies;
-            let lit = if pyramid.is_some() { &*lit } else { &*view };
+            let lit = if is_pyramid { &*lit } else { &*view };
             if has_part {
                 body.set_clipped(lit, &self.cell);
             } else {
                 body.clear();
             }
-            self.cell.extend(pyramid.into_iter().flatten());
+            self.cell.extend_from_slice(&self.pyramid);
             let along = face.and_then(|f| faces.side(f)).map_or(Along::View, Along::Side);
             self.draft_slices(Part { face, ..part }, &along, request);
         }
@@ -343,7 +359,8 @@ impl Planner {
     /// light.
     fn theta(&self, light: &Light, camera: &Camera) -> f64 {
         let Bodies { view, lit, .. } = &self.bodies;
-        let seen = if matches!(light, Light::Spot(_)) { lit } else { view };
+        let is_one_pyramid = !self.pyramid.is_empty() && light.sides().len() == 1;
+        let seen = if is_one_pyramid { lit } else { view };
         let middle = (!seen.is_empty()).then(|| seen.bounds().center());
         theta(light, camera, middle.unwrap_or(camera.forward() * camera.near()))
     }

@@ -21,17 +21,21 @@ use crate::aliasing::Local;
 use crate::camera::Camera;
 use crate::focus::Body;
 use crate::math::Keyed;
-use crate::plan::{MapError, Rows, ShadowMap};
+use crate::plan::{MapError, Rows, ShadowMap, Slab};
 use crate::warp::{Seen, Shape};
 use glam::DVec3;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
 /// The share by which the reported maximum may exceed the true one.
 const TOLERANCE: f64 = 0.01;
-/// Number of halvings after which the remaining bounds are reported as they are. Parallel light
-/// needs dozens; only spot lights near their receivers and views over many orders of magnitude
-/// reach this number.
-const MAX_SPLITS: usize = 100;
+/// Number of halvings after which the remaining bounds are reported as they are, if they are finite.
+/// Parallel light needs dozens, most lamps hundreds; lamps near their receivers and views over many
+/// orders of magnitude reach this number.
+const MAX_SPLITS: usize = 1000;
+/// Number of halvings after which bounds are reported even if they are infinite. A simplex has no
+/// bound where the light sees its corners in opposite directions, which few halvings end.
+const MAX_UNBOUNDED_SPLITS: usize = 20 * MAX_SPLITS;
 
 /// The errors and their factors at a corner of a simplex.
 #[derive(Clone, Copy, Debug)]
@@ -82,16 +86,31 @@ struct Point {
     error: f64,
 }
 
-/// The largest errors of `map` over `body` (local space), pixels per texel: never less than the
-/// true maximum, and at most one per cent more in all but extreme views.
-pub(crate) fn worst_errors(
+/// The largest errors in s and in t of `map` over `body` (local space), pixels per texel: never less
+/// than the true maxima, and at most one per cent more in all but extreme views.
+pub(crate) fn worst_in_s_and_t(
     map: &ShadowMap,
     body: &Body,
     camera: &Camera,
     buffers: &mut Buffers,
-) -> MapError {
+) -> [f64; 2] {
+    let [s, t, _] = search(&Probe { map, camera, of: 0..2 }, body, buffers);
+    [s, t]
+}
+
+/// The largest error in the worst direction, as [`worst_in_s_and_t`].
+pub(crate) fn worst_direction(
+    map: &ShadowMap,
+    body: &Body,
+    camera: &Camera,
+    buffers: &mut Buffers,
+) -> f64 {
+    search(&Probe { map, camera, of: 2..3 }, body, buffers)[2]
+}
+
+/// Upper bounds of the errors that the probe is for; the others are not defined.
+fn search(probe: &Probe<'_>, body: &Body, buffers: &mut Buffers) -> [f64; 3] {
     let Buffers { corners, open, .. } = buffers;
-    let probe = Probe { map, camera };
     corners.clear();
     corners.extend(body.vertices().iter().filter_map(|&v| probe.corner(v)));
     open.clear();
@@ -99,10 +118,10 @@ pub(crate) fn worst_errors(
     let mut search = Search { probe, corners, open, best, settled: best };
     // If a body is smaller than the rounding of its position, the map may not apply at its corners.
     if search.corners.len() == body.vertices().len() {
-        let edges_suffice = search.probe.edges_suffice();
+        let edges_suffice = probe.edges_suffice();
         for cell in body.cells() {
             // The bounds hold for the convex hull of any number of corners.
-            let whole = search.probe.bound(&search.corners[cell.vertices()]);
+            let whole = probe.bound(&search.corners[cell.vertices()]);
             if (0..3).all(|i| whole[i] <= search.best[i]) {
                 continue;
             }
@@ -112,25 +131,26 @@ pub(crate) fn worst_errors(
                 cell.triangles().for_each(|t| search.add(t.map(|i| i as u32)));
             }
         }
-        for _ in 0..MAX_SPLITS {
-            let Some(Keyed { value: most_urgent, .. }) = search.open.pop() else { break };
+        for splits in 0..MAX_UNBOUNDED_SPLITS {
+            let Some(Keyed { key, value: most_urgent }) = search.open.pop() else { break };
+            if splits >= MAX_SPLITS && key.is_finite() {
+                search.settled = larger(search.settled, most_urgent.bound);
+                break;
+            }
             // `best` may have increased since the simplex was pushed.
             if !search.settle(most_urgent.bound) {
                 search.split(&most_urgent);
             }
         }
     }
-    // Simplices that are still open count with their bounds, if these are finite.
-    let bounds = search.open.iter().fold(search.settled, |bounds, s| {
-        larger(bounds, s.value.bound.map(|b| if b.is_finite() { b } else { 0.0 }))
-    });
-    let pixel = camera.pixel_width_per_depth();
-    let [max_s, max_t, max] = larger(search.best, bounds).map(|e| e / pixel);
-    MapError { max_s, max_t, max }
+    // Simplices that are still open count with their bounds.
+    let bounds = search.open.iter().fold(search.settled, |bounds, s| larger(bounds, s.value.bound));
+    let pixel = probe.camera.pixel_width_per_depth();
+    larger(search.best, bounds).map(|e| e / pixel)
 }
 
 /// The largest errors of a one-point map under parallel light, given by its shape, over a body whose
-/// vertices are at `seen` in light space. As those of [`worst_errors`], which takes longer.
+/// vertices are at `seen` in light space. As those of [`worst_in_s_and_t`] and [`worst_direction`], which take longer.
 ///
 /// m_s = w/z and m_t = w²/z, up to factors, are largest at vertices. The error in the worst
 /// direction is w/z times the norm of a matrix that is affine in x and z. Both factors are largest
@@ -156,11 +176,8 @@ pub(crate) fn worst_of_shape(
     let norm = |w: f64, off_axis: f64| shape.texel_over_w(w, off_axis, resolution).longest();
     let texel = shape.texel_over_w(1.0, 0.0, resolution);
     let pixel = camera.pixel_width_per_depth();
-    let error = |max: f64| MapError {
-        max_s: most[0] * texel.base / pixel,
-        max_t: most[1] * texel.height / pixel,
-        max: max / pixel,
-    };
+    let [max_s, max_t] = [most[0] * texel.base / pixel, most[1] * texel.height / pixel];
+    let error = |max: f64| MapError::new([max_s, max_t], max / pixel);
     if shape.is_even() {
         return error(most[0] * norm(1.0, 0.0));
     }
@@ -183,7 +200,7 @@ pub(crate) fn worst_of_shape(
         while let Some([a, b]) = segments.pop() {
             let bound = edge_bound(&a, &b);
             if bound <= best * (1.0 + TOLERANCE) || splits == 0 {
-                settled = settled.max(if bound.is_finite() { bound } else { 0.0 });
+                settled = settled.max(bound);
                 continue;
             }
             splits -= 1;
@@ -233,7 +250,7 @@ fn larger(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 struct Search<'a> {
-    probe: Probe<'a>,
+    probe: &'a Probe<'a>,
     corners: &'a mut Vec<Corner>,
     open: &'a mut BinaryHeap<Keyed<Simplex>>,
     /// The largest errors found.
@@ -252,7 +269,8 @@ impl Search<'_> {
             // corners. With logarithmic rows A itself is affine, and all errors are largest at the
             // corners.
             let exact = if self.probe.map.rows == Rows::Even { 2 } else { 3 };
-            bound[..exact].copy_from_slice(&larger(a.errors, b.errors)[..exact]);
+            let ends = larger(a.errors, b.errors);
+            self.probe.of.clone().filter(|&i| i < exact).for_each(|i| bound[i] = ends[i]);
         }
         if !self.settle(bound) {
             let urgency =
@@ -298,6 +316,8 @@ impl Search<'_> {
 struct Probe<'a> {
     map: &'a ShadowMap,
     camera: &'a Camera,
+    /// Of the errors in s, in t and in the worst direction, those that are bounded.
+    of: Range<usize>,
 }
 
 impl Probe<'_> {
@@ -323,22 +343,50 @@ impl Probe<'_> {
         self.map.apex.is_none() && t.cross(w).length() <= 1e-9 * t.length() * w.length()
     }
 
-    /// Upper bounds over the convex hull of some corners of the errors in s, in t and in the worst direction.
+    /// The axis of the map's light, if it is a lamp.
+    fn axis(&self) -> Option<DVec3> {
+        match self.map.slab {
+            Slab::Distances { axis, .. } => Some(axis),
+            Slab::Leaning { .. } => None,
+        }
+    }
+
+    /// `mean`, if its dot product with the corners' vectors is positive at all corners, or else
+    /// `other`, which is less close to them.
+    fn towards_all(
+        mean: DVec3,
+        corners: &[Corner],
+        vector: &dyn Fn(&Corner) -> DVec3,
+        other: impl FnOnce() -> DVec3,
+    ) -> DVec3 {
+        let is_good = corners.iter().all(|c| vector(c).dot(mean) > 0.0);
+        if is_good { mean } else { other() }
+    }
+
+    /// Upper bounds over the convex hull of some corners of the errors in s, in t and in the worst
+    /// direction; 0 for those that are not asked for.
     fn bound(&self, corners: &[Corner]) -> [f64; 3] {
         let max = |f: &dyn Fn(&Corner) -> f64| corners.iter().map(f).fold(0.0, f64::max);
         let w_over_z = max(&|c| c.w / c.z);
         // m_t = w²/|N|, where N = w² ∇t is affine. |N| is at least its component along any
         // fixed direction, and the ratio of w to that component is again largest at a corner. (With
         // logarithmic rows this ratio has light space's own w as a further factor.)
-        let normal = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
-        let t = w_over_z
-            * max(&|c| {
-                let cos = c.normal_t.dot(normal) / c.normal_t.length();
-                if cos > 0.0 { c.errors[1] * c.z / c.w / cos } else { f64::INFINITY }
-            });
+        let mean = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
+        let normal = Self::towards_all(mean, corners, &|c| c.normal_t, || {
+            // Under a lamp N = w² ∇t lies within 90° of light space's z for a one-point warp.
+            let t = self.map.shadow_from_local.row(1).truncate();
+            self.axis().map_or(t, |axis| t - axis * axis.dot(t)).normalize_or_zero()
+        });
+        let t = || {
+            w_over_z
+                * max(&|c| {
+                    let cos = c.normal_t.dot(normal) / c.normal_t.length();
+                    if cos > 0.0 { c.errors[1] * c.z / c.w / cos } else { f64::INFINITY }
+                })
+        };
         // Logarithmic rows scale B's second column. Within the simplex the scale varies by this
         // factor at most.
-        let spread = max(&|c| c.row_scale) * max(&|c| c.row_scale.recip());
+        let spread = || max(&|c| c.row_scale) * max(&|c| c.row_scale.recip());
         let norm = |i: usize| match self.map.apex {
             None => {
                 let affine = max(&|c| c.errors[i] * c.z / c.w);
@@ -349,7 +397,10 @@ impl Probe<'_> {
                 // ‖A‖/z = w ‖r × K‖/(|r| z), and |r| is at least its component along a
                 // fixed direction. The bound may combine that component with w or with ‖r ×
                 // K‖.
-                let middle = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
+                let mean = corners.iter().map(|c| c.p - apex).sum::<DVec3>().normalize_or_zero();
+                let middle = Self::towards_all(mean, corners, &|c| c.p - apex, || {
+                    self.axis().unwrap_or(mean)
+                });
                 let per_share = |value: &dyn Fn(&Corner) -> f64| {
                     max(&|c| {
                         let share = (c.p - apex).dot(middle);
@@ -361,6 +412,11 @@ impl Probe<'_> {
                 with_w.min(with_norm)
             }
         };
-        [norm(0), t, norm(2) * spread]
+        [0, 1, 2].map(|i| match i {
+            _ if !self.of.contains(&i) => 0.0,
+            0 => norm(0),
+            1 => t(),
+            _ => norm(2) * spread(),
+        })
     }
 }

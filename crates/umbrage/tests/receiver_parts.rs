@@ -3,73 +3,10 @@
 
 mod common;
 
-use common::{Config, WARPS, config, partition, planner, possible, technique};
+use common::{Config, WARPS, boxes, config, partition, parts, planner, possible, technique};
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{Aabb, Bounds, BoxTree, Faces, Light, Partition, Plan, Splits, Technique, Warp};
-
-/// Boxes among a configuration's receivers, or in its view if it has none. Some are flat, some
-/// empty, some repeated and some out of sight. They are described by numbers that apply to any
-/// configuration.
-fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
-    let unit = || prop::array::uniform3(0.0..=1.0f64);
-    let within = (unit(), unit(), 0.0..=1.0f64, 0usize..6)
-        .prop_map(|(a, b, size, flat)| PartialBox::Within { a, b, size, flat });
-    let some = prop_oneof![
-        8 => within,
-        1 => Just(PartialBox::Empty),
-        1 => Just(PartialBox::SameAsLast),
-        1 => Just(PartialBox::OutOfSight),
-    ];
-    // Of the longer lists, some boxes are served in groups.
-    prop_oneof![
-        9 => prop::collection::vec(some.clone(), 1..12),
-        1 => prop::collection::vec(some, 40..160),
-    ]
-}
-
-#[derive(Clone, Debug)]
-enum PartialBox {
-    /// From a towards b, by the share `size` of the way; flat along the axis that `flat` names, if
-    /// any.
-    Within {
-        a: [f64; 3],
-        b: [f64; 3],
-        size: f64,
-        flat: usize,
-    },
-    Empty,
-    SameAsLast,
-    OutOfSight,
-}
-
-fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
-    let Config { camera, bounds, .. } = config;
-    let place = |n: [f64; 3]| match bounds.receivers {
-        Some(all) => all.min + all.size() * DVec3::from(n),
-        None => common::point_in_view(camera, n),
-    };
-    let mut parts: Vec<Aabb> = Vec::new();
-    for partial in boxes {
-        parts.push(match *partial {
-            PartialBox::Within { a, b, size, flat } => {
-                let a = place(a);
-                let mut b = a.lerp(place(b), size);
-                if flat < 3 {
-                    b[flat] = a[flat];
-                }
-                Aabb::new(a, b)
-            }
-            PartialBox::Empty => Aabb::EMPTY,
-            PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
-            PartialBox::OutOfSight => {
-                let behind = camera.eye() - camera.forward() * 3.0 * camera.far();
-                Aabb::new(behind, behind + camera.far() * 0.1)
-            }
-        });
-    }
-    parts
-}
 
 /// Points of the parts that the camera sees in the light.
 fn seen_points(config: &Config, parts: &[Aabb], numbers: &[[f64; 3]]) -> Vec<DVec3> {

@@ -45,6 +45,25 @@ fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
     );
 }
 
+/// Finite numbers of any size and sign, down to the least one that is not 0.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        3 => prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+        2 => -10.0..10.0f64,
+        1 => prop::sample::select(&[f64::MIN_POSITIVE, 1e-308, 1e-12, 1e12, f64::MAX, -f64::MAX][..]),
+    ]
+}
+
+/// Views and warps at the limits of what is valid.
+fn extreme_warped() -> impl Strategy<Value = Warped> {
+    let end = || prop_oneof![Just(1e-12), Just(1e12), (-27.0..27.0f64).prop_map(f64::exp)];
+    let phi = prop_oneof![Just(1e-6), Just(FRAC_PI_2 - 1e-6), 0.01..1.5f64];
+    let lambda = prop_oneof![Just(1e-12), Just(f64::MAX), Just(f64::INFINITY), 1e-6..1e6f64];
+    (end(), end(), phi, thetas(), lambda).prop_filter_map("a view", |(n, f, phi, theta, lambda)| {
+        Tilted::new(View::new(n, f, phi).ok()?, theta).ok()?.warped(lambda).ok()
+    })
+}
+
 /// Near planes, depth ratios from 1.001 to 1e4 and half fields of view from 2° to 80°.
 fn views() -> impl Strategy<Value = View> {
     (-4.6..2.3f64, 1e-3..9.2f64, 2.0..80.0f64).prop_map(|(n, ratio, phi)| {
@@ -949,5 +968,82 @@ fn extreme_situations_stay_numbers() {
                 assert!(numbers.iter().all(|x| *x >= 0.0 || x.is_finite()), "{what}: {numbers:?}");
             }
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// What is `Ok` is finite, however extreme the numbers are. (No warp is an infinite λ, and a
+    /// surface along the light has an infinite projection error.)
+    #[test]
+    fn results_are_finite_or_errors(
+        warped in extreme_warped(),
+        numbers in prop::array::uniform5(any_number()),
+        rule in prop::sample::select(&RULES[..]),
+        slices in 1u32..=16,
+    ) {
+        let [a, b, c, d, e] = numbers;
+        let tilted = warped.tilted();
+        let view = tilted.view();
+        let finite = |what: &str, result: Result<Vec<f64>, Error>| match result {
+            Ok(values) if values.iter().all(|x| x.is_finite()) => Ok(()),
+            Ok(values) => Err(TestCaseError::fail(format!("{what}: {values:?}"))),
+            Err(Error::Invalid { field, .. }) if field.starts_with("theory.") => Ok(()),
+            Err(error) => Err(TestCaseError::fail(format!("{what}: {error}"))),
+        };
+        let not_nan = |what: &str, result: Result<Vec<f64>, Error>| {
+            let infinite_counts = result.map(|r| r.into_iter().map(|x| if x == f64::INFINITY { 1.0 } else { x }).collect());
+            finite(what, infinite_counts)
+        };
+        let both = |e: Errors| vec![e.q, e.p];
+        for z in [b.abs(), view.near(), view.far()] {
+            finite("errors", warped.errors(a, z).map(both))?;
+            finite("log_error", warped.log_error(a, z).map(|x| vec![x]))?;
+            not_nan("projection", warped.projection([c, a, z], [d, e]).map(both))?;
+            let overhead = Overhead::new(view, warped.lambda()).unwrap();
+            finite("m_s", overhead.m_s(z).map(|x| vec![x]))?;
+            finite("m_t", overhead.m_t(z).map(|x| vec![x]))?;
+            finite("storage", Ok(vec![overhead.storage_factor()]))?;
+        }
+        let extrema = warped.extrema();
+        for range in [extrema.q, extrema.p, extrema.product] {
+            finite("extrema", Ok(vec![range.least.value, range.largest.value]))?;
+        }
+        for rule in [rule, Rule::Tsm { focus: Some(a.abs()) }, Rule::Lambda(b.abs())] {
+            not_nan("lambda", tilted.lambda(rule).map(|x| vec![x]))?;
+            finite("gain", tilted.adaptive_gain(rule).map(|x| vec![x]))?;
+            for (faces, light) in [
+                (Faces::Whole, LightFrom::Overhead),
+                (Faces::Whole, LightFrom::Angle(tilted.theta_rad())),
+                (Faces::SidesAndNear, LightFrom::Behind),
+            ] {
+                let storage = storage_factor(view, rule, slices, faces, light);
+                finite("storage_factor", storage.map(|x| vec![x]))?;
+            }
+        }
+        finite("slice", view.slice(slices / 2, slices).map(|v| vec![v.near(), v.far()]))?;
+        not_nan("lambda_from_eta", view.lambda_from_eta(c).map(|x| vec![x]))?;
+        finite("eta_from_lambda", view.eta_from_lambda(d).map(|x| vec![x]))?;
+        let split = budget_split([a.abs(), b.abs()], c.abs());
+        finite("budget_split", split.map(|sides| sides.to_vec()))?;
+    }
+
+    /// The same for the series of convolution shadow maps, which takes longer.
+    #[test]
+    fn steps_are_finite_or_errors(
+        order in 1u32..=8,
+        numbers in prop::array::uniform3(any_number()),
+        depths in prop::array::uniform2(0.0..=1.0f64),
+        offset: bool,
+        scale: bool,
+    ) {
+        let Ok(step) = FourierStep::new(order, numbers[0]) else { return Ok(()) };
+        for [receiver, occluder] in [depths, [numbers[1], numbers[2]], [depths[0], numbers[1]]] {
+            if let Ok(v) = step.visibility(receiver, occluder, StepAt { offset, scale }) {
+                prop_assert!((0.0..=1.0).contains(&v), "{}", v);
+            }
+        }
+        prop_assert!(step.offset().is_finite());
     }
 }

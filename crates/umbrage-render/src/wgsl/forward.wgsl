@@ -14,7 +14,7 @@ struct View {
     light_range: f32,
     // View direction, unit length.
     forward: vec3f,
-    // Cosine of a spot light's half angle.
+    // Cosine of a spot light's half angle; -1 for other lights.
     light_cosine: f32,
     // Direction in which the light travels, unit length.
     light_direction: vec3f,
@@ -161,26 +161,29 @@ fn faces_light(position: vec3f, normal: vec3f) -> bool {
     if (dot(normal, light) <= 0.0) {
         return false;
     }
+    if (view.light_kind == DIRECTIONAL) {
+        return true;
+    }
+    let is_in_cone = -dot(view.light_direction, light) >= view.light_cosine;
+    return is_in_cone && distance_from_lamp(position) <= view.light_range;
+}
+
+// Distance from a spot or point light, as the light's range counts it.
+fn distance_from_lamp(position: vec3f) -> f32 {
     let from_light = position - view.light_position;
     if (view.light_kind == SPOT) {
-        let along = dot(view.light_direction, from_light);
-        return along <= view.light_range && -dot(view.light_direction, light) >= view.light_cosine;
+        return dot(view.light_direction, from_light);
     }
-    return view.light_kind == DIRECTIONAL || length(from_light) <= view.light_range;
+    return length(from_light);
 }
 
 // A spot or point light fades to nothing at the end of its range (Karis 2013, without the inverse
 // square).
 fn attenuation(position: vec3f) -> f32 {
-    let from_light = position - view.light_position;
     if (view.light_kind == DIRECTIONAL) {
         return 1.0;
     }
-    var distance = length(from_light);
-    if (view.light_kind == SPOT) {
-        distance = dot(view.light_direction, from_light);
-    }
-    let relative = distance / view.light_range;
+    let relative = distance_from_lamp(position) / view.light_range;
     let squared = relative * relative;
     let window = max(1.0 - squared * squared, 0.0);
     return window * window;

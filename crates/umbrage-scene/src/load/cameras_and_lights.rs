@@ -9,8 +9,9 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, camera};
 use umbrage::{Aabb, Light, PointLight, SpotLight};
 
-/// Largest half angle of a spot light's cone, radians: the limit of [`SpotLight::half_angle_rad`].
-const MAX_HALF_ANGLE_RAD: f64 = 85.0 * std::f64::consts::PI / 180.0;
+/// Largest half angle of a spot light's cone, radians: that of glTF and of
+/// [`SpotLight::half_angle_rad`].
+const MAX_HALF_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
 /// Ratio of the near distance, where the shadows of a spot or point light begin, to its range: a
 /// centimetre for a range of 10 m.
@@ -101,8 +102,9 @@ pub(super) fn load_light(
                 return Err(document.invalid(&place, "is a spot light without a cone"));
             };
             let outer = f64::from(cone.outer_cone_angle);
-            if !(outer > 0.0 && outer <= MAX_HALF_ANGLE_RAD) {
-                notices.add(&place, "outerConeAngle must be above 0° and at most 85°, clamped");
+            // In single precision 90° is a little more than in double precision.
+            if !(outer > 0.0 && outer <= MAX_HALF_ANGLE_RAD + 1e-6) {
+                notices.add(&place, "outerConeAngle must be above 0° and at most 90°, clamped");
             }
             let half_angle_rad = outer.clamp(1e-3, MAX_HALF_ANGLE_RAD);
             Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })

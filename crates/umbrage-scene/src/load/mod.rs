@@ -39,7 +39,7 @@ const WORLD_END: f64 = 1e12;
 /// - Materials whose image is missing or invalid are plain.
 /// - Translucent (`BLEND`) materials are solid where alpha is at least one half and absent
 ///   elsewhere.
-/// - Spot light cones with half angles beyond 85° are narrowed to 85°.
+/// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
 /// Vertex colours, morph targets and orthographic cameras are not supported and are left out, also
 /// with a notice.

@@ -1,7 +1,7 @@
 use super::occupancy::Occupancy;
 use super::{THUMBNAIL, thumbnail};
 use glam::{DQuat, DVec3};
-use umbrage::Light;
+use umbrage::{Light, PointLight, SpotLight};
 
 /// A light for a view, and its score in that view.
 pub(super) struct Lighting {
@@ -42,14 +42,8 @@ pub(super) fn lighting(
     let judge = |light: &Light| {
         let is_lit = |p: DVec3| match light {
             Light::Directional { direction } => grid.look(p, -*direction).is_none(),
-            Light::Spot(spot) => {
-                let from_lamp = p - spot.position;
-                spot.direction.angle_between(from_lamp) < spot.half_angle_rad
-                    && spot.direction.normalize_or_zero().dot(from_lamp) <= spot.range
-                    && reaches(p, spot.position)
-            }
-            Light::Point(point) => {
-                p.distance(point.position) <= point.range && reaches(p, point.position)
+            Light::Spot(SpotLight { position, .. }) | Light::Point(PointLight { position, .. }) => {
+                light.reaches(p) && reaches(p, *position)
             }
         };
         let lit: Vec<Option<bool>> = seen.iter().map(|p| p.map(is_lit)).collect();
@@ -96,7 +90,6 @@ pub(super) fn towards_sun(forward: DVec3, azimuth_deg: f64, elevation_deg: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use umbrage::PointLight;
 
     #[test]
     fn a_lamp_shines_out_of_its_cage() {

@@ -14,7 +14,7 @@ use crate::slab::along_axis;
 use crate::stable::{Stable, bounding_sphere};
 use crate::technique::{Cover, Objective, Warp};
 use crate::warp::{LightSpace, OnePoint, Precision, Search, Seen, Shape, View, psm};
-use crate::worst::{self, worst_errors};
+use crate::worst::{self, worst_in_s_and_t};
 use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// What the planner knows about a map besides the map itself.
@@ -35,6 +35,9 @@ pub(super) struct Draft {
     /// The map's shape on the light plane, if it is a one-point map with even rows under parallel
     /// light. Its errors follow from the shape and the points seen.
     pub(super) shape: Option<Shape>,
+    /// Upper bounds of the map's largest errors in s and t if it had one texel, where the choice of
+    /// its warp required them.
+    pub(super) largest_errors: Option<[f64; 2]>,
     /// The placement of a stable map, whose matrices do depend on its resolution.
     pub(super) stable: Option<Stable>,
 }
@@ -96,7 +99,7 @@ impl Drafting {
         };
         let camera = request.camera;
         let Self { covered, outline, worst, .. } = self;
-        let Draft { map, body, seen, shape, .. } = draft;
+        let Draft { map, body, seen, shape, largest_errors, .. } = draft;
         // The errors of a map of one texel determine the resolution.
         map.resolution = [1, 1];
         map.apex = space.apex;
@@ -123,17 +126,17 @@ impl Drafting {
             return shape_errors(&chosen, seen, camera);
         }
         // Under a spot light `adaptive` chooses a warp from sample points. A comparison of the true
-        // errors ensures that it is never worse than `uniform`.
+        // errors ensures that it is never worse than `uniform`. They are kept, so that the errors
+        // reported compare in the same way.
         if warp == Warp::Adaptive(Objective::Storage) && nu > 0.0 {
-            let mut storage = |map: &ShadowMap| {
-                let error = worst_errors(map, body, camera, worst);
-                error.max_s * error.max_t
-            };
-            let warped = storage(map);
+            let warped = worst_in_s_and_t(map, body, camera, worst);
             set(map, family.shape(0.0, outline).homography());
-            if storage(map) > warped {
+            let even = worst_in_s_and_t(map, body, camera, worst);
+            let is_better = warped[0] * warped[1] < even[0] * even[1];
+            if is_better {
                 set(map, chosen.homography());
             }
+            *largest_errors = Some(if is_better { warped } else { even });
         }
         unit_errors(map, body, camera)
     }

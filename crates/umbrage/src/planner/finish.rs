@@ -8,11 +8,11 @@ use crate::error::Error;
 use crate::focus::{Body, thickened};
 use crate::math::range;
 use crate::matrices::MARGIN_TEXELS;
-use crate::plan::{ShadowMap, Slab};
+use crate::plan::{MapError, ShadowMap, Slab};
 use crate::resolution::enlarged;
 use crate::slab::{all_distances, distances, slab};
 use crate::technique::Size;
-use crate::worst::{self, worst_errors, worst_of_shape};
+use crate::worst::{self, worst_direction, worst_in_s_and_t, worst_of_shape};
 use glam::{DVec2, DVec3, Vec4Swizzles};
 
 /// The largest distance before the receivers at which casters keep their depths, in ranges of the
@@ -104,16 +104,31 @@ impl Finishing {
             map.resolution = [0, 0];
             return Ok(());
         }
+        let worst = &mut self.worst;
+        let Draft { body, seen, shape, stable, .. } = draft;
+        // The largest errors in s and t are inversely proportional to the resolution, unless the
+        // map is stable, whose matrices depend on it.
+        let unit = match (shape, stable) {
+            (None, None) => {
+                draft.largest_errors.unwrap_or_else(|| worst_in_s_and_t(map, body, camera, worst))
+            }
+            _ => [0.0; 2],
+        };
         let mut margin = 0.0;
         let mut set = |map: &mut ShadowMap, size: [u32; 2]| {
             map.resolution = size;
-            if let Some(stable) = &draft.stable {
+            if let Some(stable) = stable {
                 margin = stable.place(map);
             }
-            let Draft { body, seen, shape, .. } = draft;
-            map.error = match shape.or_else(|| draft.stable.as_ref()?.shape(size)) {
-                Some(shape) => worst_of_shape(&shape, size, body, seen, camera, &mut self.worst),
-                None => worst_errors(map, body, camera, &mut self.worst),
+            map.error = match shape.or_else(|| stable.as_ref()?.shape(size)) {
+                Some(shape) => worst_of_shape(&shape, size, body, seen, camera, worst),
+                None => {
+                    let s_and_t = match stable {
+                        None => [0, 1].map(|i| unit[i] / f64::from(size[i])),
+                        Some(_) => worst_in_s_and_t(map, body, camera, worst),
+                    };
+                    MapError::new(s_and_t, worst_direction(map, body, camera, worst))
+                }
             };
         };
         set(map, size);

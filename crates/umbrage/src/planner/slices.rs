@@ -109,7 +109,7 @@ impl Planner {
             let range = [split[0], reach].map(|d| d.clamp(camera.near(), camera.far()));
             Stable::around(request.projector, camera, range)
         });
-        draft.shape = None;
+        (draft.shape, draft.largest_errors) = (None, None);
         let space = LightSpace::fixed(request.projector, camera);
         let unit = match draft.stable {
             None => self.drafting.draft(draft, along, *warp, request),

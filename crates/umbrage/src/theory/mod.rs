@@ -112,6 +112,14 @@ impl View {
     }
 }
 
+/// Checks that results are finite, which they are not where the numbers of `field` are so extreme
+/// that the results exceed the largest numbers there are.
+fn check_finite<const N: usize>(results: [f64; N], field: &'static str) -> Result<(), Error> {
+    check(results.iter().all(|x| x.is_finite()), field, || {
+        "must be finite and not so extreme that the result exceeds the largest number".into()
+    })
+}
+
 /// Checks a warp's λ, metres, at least 1e-12, or infinite for no warp.
 fn check_lambda(lambda: f64) -> Result<(), Error> {
     check(lambda >= 1e-12, "theory.lambda", || {

@@ -1,4 +1,4 @@
-use super::{View, check_lambda};
+use super::{View, check_finite, check_lambda};
 use crate::error::{Error, check};
 
 /// Light at right angles to the view (θ = 90°), and a one-point perspective along the view, whose
@@ -118,7 +118,7 @@ impl Overhead {
 /// # Errors
 ///
 /// [`Error::Invalid`] with the field `theory.critical_resolution` or `theory.texels` unless all
-/// values are positive and finite.
+/// values are positive and finite, or if they are so extreme that a side is not.
 pub fn budget_split(critical_resolution: [f64; 2], texels: f64) -> Result<[f64; 2], Error> {
     let is_good = |x: f64| x > 0.0 && x.is_finite();
     let [s, t] = critical_resolution;
@@ -128,8 +128,10 @@ pub fn budget_split(critical_resolution: [f64; 2], texels: f64) -> Result<[f64; 
     check(is_good(texels), "theory.texels", || {
         format!("must be positive and finite, is {texels}")
     })?;
-    let shape = (s / t).sqrt();
-    Ok([texels.sqrt() * shape, texels.sqrt() / shape])
+    let shape = s.sqrt() / t.sqrt();
+    let sides = [texels.sqrt() * shape, texels.sqrt() / shape];
+    check_finite(sides, "theory.critical_resolution")?;
+    Ok(sides)
 }
 
 impl View {

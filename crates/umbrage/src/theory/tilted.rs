@@ -1,4 +1,4 @@
-use super::{View, check_lambda};
+use super::{View, check_finite, check_lambda};
 use crate::error::{Error, check};
 
 /// A view and parallel light at any angle to it, in the plane of the view's y axis and direction
@@ -222,7 +222,9 @@ impl Warped {
     /// [`Error::Invalid`] with the field `theory.point`.
     pub fn errors(&self, y: f64, z: f64) -> Result<Errors, Error> {
         self.check_point(y, z)?;
-        Ok(self.errors_inside(y, z))
+        let errors = self.errors_inside(y, z);
+        check_finite([errors.q, errors.p], "theory.point")?;
+        Ok(errors)
     }
 
     fn errors_inside(&self, y: f64, z: f64) -> Errors {
@@ -252,23 +254,25 @@ impl Warped {
     /// # Errors
     ///
     /// [`Error::Invalid`] with the field `theory.point`, or with `theory.slope` if the slope is not
-    /// finite or a factor is 0/0.
+    /// finite or a factor is 0/0 or exceeds the largest number.
     pub fn projection(&self, [x, y, z]: [f64; 3], slope: [f64; 2]) -> Result<Errors, Error> {
         self.check_point(y, z)?;
         check(x.is_finite(), "theory.point", || format!("must be finite, is at x = {x}"))?;
         let Tilted { sin, cos, .. } = self.tilted;
         let [k_x, k_y] = slope;
+        check_finite(slope, "theory.slope")?;
         // Derivative of z_w along the slope.
         let along_w = sin - cos * k_y;
         // On the plane of symmetry the factor is 1 for every k_x, also in the limit of 0/0.
-        let q = if x == 0.0 { 1.0 } else { (k_x - x / z) / (k_x - x / self.z_w(y, z) * along_w) };
+        let across_w = k_x - x / self.z_w(y, z) * along_w;
+        check_finite([x / z, y / z, across_w, along_w], "theory.point")?;
+        let q = if x == 0.0 { 1.0 } else { (k_x - x / z) / across_w };
         let q = q.abs();
         let p = ((k_y - y / z) / along_w).abs();
-        let is_good = k_x.is_finite() && k_y.is_finite() && !q.is_nan() && !p.is_nan();
-        check(is_good, "theory.slope", || {
-            format!(
-                "must be finite and not along both the light and the line of sight, is {k_x}, {k_y}"
-            )
+        let is_good =
+            |factor: f64, divisor: f64| factor.is_finite() || divisor == 0.0 && !factor.is_nan();
+        check(is_good(q, across_w) && is_good(p, along_w), "theory.slope", || {
+            format!("must not be along both the light and the line of sight, is {k_x}, {k_y}")
         })?;
         Ok(Errors { q, p })
     }
@@ -286,7 +290,9 @@ impl Warped {
         let nu = mu * self.per_lambda;
         // λ ln(1 + μ/λ), whose limit without a warp is μ.
         let range = if nu == 0.0 { mu } else { mu * nu.ln_1p() / nu };
-        Ok(range * self.widening(y, z) / (z * self.tilted.tan_phi))
+        let error = range * self.widening(y, z) / (z * self.tilted.tan_phi);
+        check_finite([error], "theory.point")?;
+        Ok(error)
     }
 
     /// The smallest and the largest errors over V, and where they are reached (Theory §3.1).

@@ -65,7 +65,8 @@ impl Front {
 }
 
 impl Search {
-    /// The strength ν = μ/λ of least error over the points seen.
+    /// The strength ν = μ/λ of least error over the points seen, times `fade`, or 0 if the error is
+    /// no larger without a warp.
     ///
     /// Let w_j = 1 + ν ζ_j at vertex j, where ζ_j ∈ [0, 1] is its position between near and far
     /// plane and d_j its view distance. The largest errors over the body are those at its vertices:
@@ -80,6 +81,7 @@ impl Search {
         view: &View<'_>,
         objective: Objective,
         precision: Precision,
+        fade: f64,
     ) -> f64 {
         let (tolerance, flatness) = (precision.tolerance(), precision.flatness());
         self.set_front(family, view.seen);
@@ -134,9 +136,10 @@ impl Search {
             found = cost(at);
         }
         let omega = if lo.1 <= hi.1 { lo.0 } else { hi.0 };
-        let nu = omega.exp_m1();
+        let nu = omega.exp_m1() * fade;
         // The minimum may be at the bracket's lower end: no warp. The front may stand for points
-        // that do not exist, so the points themselves decide.
+        // that do not exist, and between no warp and the best strength errors can be larger than
+        // at both. So the points themselves decide.
         let exact =
             |nu: f64| Cost::of(family, nu, view, objective, view.seen.iter().map(Front::of)).value;
         if exact(0.0) <= exact(nu) { 0.0 } else { nu }

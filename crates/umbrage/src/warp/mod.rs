@@ -194,11 +194,10 @@ impl OnePoint {
             Warp::Adaptive(objective) => {
                 // As the view direction passes the light direction, z turns to its opposite, and
                 // the best strength for one z is not the best for the other. So the strength fades
-                // out before. As the cost has a single minimum, less than the best strength is
-                // still better than no warp.
+                // out before.
                 let phi = camera.tan_half_fov_y().atan();
                 let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
-                search.least_error(self, view, objective, precision) * fade
+                search.least_error(self, view, objective, precision, fade)
             }
             Warp::Lispsm => self.along_view(space, |view| {
                 let f = view.n + (view.f - view.n).min(view.mu_metres * view.sin_theta);

@@ -2,6 +2,9 @@ use super::LightSpace;
 use crate::camera::Camera;
 use glam::{DMat3, DVec3, DVec4, Vec4Swizzles};
 
+/// The largest |C.w|/|C| with which the light's image C counts as lying at infinity.
+const AT_INFINITY: f64 = 1e-8;
+
 /// Perspective shadow maps (Stamminger and Drettakis 2002): the homography of the light plane that
 /// shows the world from the light after the viewer's perspective, before it is scaled to [0, 1]².
 /// `None` if no perspective from the light shows all of `vertices` (local space).
@@ -59,9 +62,12 @@ pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Op
         DVec3::new(x, z, w)
     };
     // The functionals of s and t are divided by C.w, so that they neither vanish nor change sign as
-    // the light passes through infinity. At infinity C lies on the axis, and e·C is 0.
+    // the light passes through infinity. At infinity C lies on the axis, and e·C is 0. Nearer to
+    // infinity than this e·C is of the size of C.w too, and of its digits rounding leaves few. A
+    // shift of s or t by a multiple of w, which is all that is missing then, makes no difference.
+    let is_at_infinity = c.w.abs() <= AT_INFINITY;
     let sideways = |e: DVec3| {
-        let shift = if c.w == 0.0 { 0.0 } else { -e.dot(c.xyz()) / c.w };
+        let shift = if is_at_infinity { 0.0 } else { -e.dot(c.xyz()) / c.w };
         on_light_plane(e.extend(shift))
     };
     let [s, t] = [across, up].map(sideways);

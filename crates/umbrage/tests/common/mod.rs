@@ -4,8 +4,8 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, Objective, Partition, Plane,
-    Planner, PointLight, Splits, SpotLight, Technique, Warp,
+    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, MapError, Objective, Partition,
+    Plan, Plane, Planner, PointLight, Slab, Splits, SpotLight, Technique, Warp,
 };
 
 /// How a map's texels are spread, and what the map covers.
@@ -50,6 +50,10 @@ pub(crate) struct Config {
     pub bounds: Bounds<'static>,
 }
 
+/// The largest ratio of the storage that `adaptive` reports to that which `uniform` does, but for
+/// rounding.
+pub(crate) const ADAPTIVE_OVER_UNIFORM: f64 = 1.0 + 1e-9;
+
 /// One map of 1024² texels.
 pub(crate) fn technique(spread: impl Into<Spread>) -> Technique {
     let Spread { warp, cover } = spread.into();
@@ -73,33 +77,58 @@ fn log_range(lo: f64, hi: f64) -> impl Strategy<Value = f64> {
 }
 
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
+    camera_with(1.0, 10.0..120.0, 1e4)
+}
+
+/// Views whose positions and distances are `scale` times as large as usual, with a field of view in
+/// degrees and a ratio of far to near distance of up to `most_ratio`.
+fn camera_with(
+    scale: f64,
+    fov_y_deg: std::ops::Range<f64>,
+    most_ratio: f64,
+) -> impl Strategy<Value = Camera> {
     let eye = prop_oneof![
         3 => Just(1.0),
         2 => Just(100.0),
         1 => Just(1e5),
     ]
-    .prop_flat_map(|r| [-r..r, -r..r, -r..r].prop_map(DVec3::from));
+    .prop_flat_map(move |r| [-r..r, -r..r, -r..r].prop_map(move |eye| DVec3::from(eye) * scale));
     (
         eye,
         direction(),
         direction(),
-        10.0..120.0f64,
+        fov_y_deg,
         log_range(0.01, 10.0),
-        log_range(1.001, 1e4),
+        log_range(1.001, most_ratio),
         prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
     )
-        .prop_map(|(eye, forward, up, fov, near, ratio, image)| {
+        .prop_map(move |(eye, forward, up, fov, near, ratio, image)| {
+            let (target, near) = (eye + forward * scale, near * scale);
             Camera::look_at(LookAt {
                 eye,
-                target: eye + forward,
+                target,
                 up,
                 fov_y_rad: fov.to_radians(),
                 near,
-                far: near * ratio,
+                far: (near * ratio).min(1e9),
                 image,
             })
             .expect("a valid camera")
         })
+}
+
+/// Views as [`camera`] gives, and odd ones: of micrometres and of a hundred thousand kilometres, as
+/// narrow as a telescope's and as wide as 179.9°.
+fn odd_camera() -> impl Strategy<Value = Camera> {
+    let scaled = (log_range(1e-6, 1e4), prop_oneof![Just(1e2), Just(1e4), Just(1e7)])
+        .prop_flat_map(|(scale, most_ratio)| {
+            prop_oneof![
+                4 => camera_with(scale, 10.0..120.0, most_ratio).boxed(),
+                1 => camera_with(scale, 0.01..10.0, most_ratio).boxed(),
+                1 => camera_with(scale, 120.0..179.9, most_ratio).boxed(),
+            ]
+        });
+    prop_oneof![1 => camera().boxed(), 2 => scaled.boxed()]
 }
 
 /// Partitions of every kind; one in three is a single map.
@@ -142,7 +171,12 @@ pub(crate) fn map_count(partition: &Partition, light: &Light) -> usize {
         Faces::Sides => 4 * slices,
         Faces::SidesAndNear => 4 * slices + 1,
     };
-    if matches!(light, Light::Point(_)) { 6 * maps } else { maps }
+    let has_cube = match light {
+        Light::Directional { .. } => false,
+        Light::Spot(spot) => spot.half_angle_rad > 75f64.to_radians(),
+        Light::Point(_) => true,
+    };
+    if has_cube { 6 * maps } else { maps }
 }
 
 /// Any direction, or one very close to the view direction or its opposite.
@@ -167,7 +201,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
                 position: seen - from * distance,
                 direction: from,
                 half_angle_rad: half.to_radians(),
-                near: distance * 0.01,
+                near: (distance * 0.01).max(1e-12),
                 range: distance * 2.0,
             })
         },
@@ -181,11 +215,99 @@ fn point(camera: Camera) -> impl Strategy<Value = Light> {
             let distance = distance * camera.far();
             Light::Point(PointLight {
                 position: point_in_view(&camera, place) + away * distance,
-                near: distance * 0.01,
+                near: (distance * 0.01).max(1e-12),
                 range: distance * 3.0,
             })
         },
     )
+}
+
+/// A spot light of any width, of which some have six maps.
+fn wide_spot(camera: Camera) -> impl Strategy<Value = Light> {
+    let half_deg = prop_oneof![60.0..90.0f64, 89.0..90.0, Just(90.0)];
+    (spot(camera), half_deg).prop_map(|(light, half_deg)| match light {
+        Light::Spot(spot) => {
+            Light::Spot(SpotLight { half_angle_rad: half_deg.to_radians(), ..spot })
+        }
+        other => other,
+    })
+}
+
+/// Lights where formulas have their limits: suns almost or exactly across or along the view or
+/// along an axis, lamps at the eye, beside it, and in the planes of the view's frustum, lamps that
+/// begin at once or reach to the end of the world.
+fn odd_light(camera: Camera) -> impl Strategy<Value = Light> {
+    let axis = || {
+        (0usize..3, any::<bool>()).prop_map(
+            |(i, back)| {
+                if back { -DVec3::AXES[i] } else { DVec3::AXES[i] }
+            },
+        )
+    };
+    let tiny = || (0.0..300.0f64).prop_map(|digits| 10f64.powf(-digits));
+    let across =
+        (direction(), tiny(), -1i8..=1).prop_filter_map("a direction", move |(d, tiny, sign)| {
+            let across = d.reject_from_normalized(camera.forward()).try_normalize()?;
+            Some(across + camera.forward() * (tiny * f64::from(sign)))
+        });
+    let along = (direction(), tiny()).prop_map(move |(d, tiny)| camera.forward() + d * tiny);
+    let suns = prop_oneof![2 => across.boxed(), 1 => along.boxed(), 1 => axis().boxed()]
+        .prop_map(|direction| Light::Directional { direction });
+    let beside_eye = (direction(), 0.0..20.0f64)
+        .prop_map(move |(d, digits)| camera.eye() + d * (camera.far() * 10f64.powf(-digits)));
+    let in_plane = ([0.0..1.0f64, 0.0..1.0], 0usize..6).prop_map(move |([u, v], plane)| {
+        let [w, h] = camera.image().map(f64::from);
+        let [left, right, top, bottom] = [[0.0, u], [1.0, u], [u, 0.0], [u, 1.0]];
+        let ray = |[x, y]: [f64; 2]| camera.ray(glam::DVec2::new(x * w, y * h));
+        let depth = camera.far() * v;
+        camera.eye()
+            + match plane {
+                0 => ray(left) * depth,
+                1 => ray(right) * depth,
+                2 => ray(top) * depth,
+                3 => ray(bottom) * depth,
+                4 => ray([u, v]) * camera.near(),
+                _ => ray([u, v]) * camera.far(),
+            }
+    });
+    let place = prop_oneof![Just(camera.eye()), beside_eye, in_plane];
+    let ends = prop_oneof![
+        2 => (log_range(1e-6, 0.1), log_range(0.2, 10.0))
+            .prop_map(move |(near, range)| [near * camera.far(), range * camera.far()]),
+        1 => Just([1e-12, 1e12]),
+    ];
+    let half_deg = prop_oneof![1.0..90.0f64, Just(90.0)];
+    let lamps = (place, ends, direction(), half_deg, any::<bool>()).prop_map(
+        |(position, [near, range], direction, half_deg, is_spot)| {
+            // At the eye of a tiny view the nearest end may be nearer than lamps allow.
+            let near = near.max(1e-12);
+            if is_spot {
+                let half_angle_rad = half_deg.to_radians();
+                Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })
+            } else {
+                Light::Point(PointLight { position, near, range })
+            }
+        },
+    );
+    prop_oneof![1 => suns.boxed(), 2 => lamps.boxed(), 1 => wide_spot(camera).boxed()]
+}
+
+/// Boxes around receivers amid the view, some of them flat, or none.
+fn receivers(camera: Camera) -> impl Strategy<Value = Option<Aabb>> {
+    let unit = || [0.0..1.0f64, 0.0..1.0, 0.0..1.0];
+    proptest::option::of((unit(), unit(), 0usize..4).prop_map(move |(a, b, flat)| {
+        let mut b = point_in_view(&camera, b);
+        let a = point_in_view(&camera, a);
+        // Some worlds are a flat floor.
+        if flat < 3 {
+            b[flat] = a[flat];
+        }
+        Aabb::new(a, b)
+    }))
+}
+
+fn bounds(receivers: Option<Aabb>) -> Bounds<'static> {
+    Bounds { receivers, casters: receivers, ..Bounds::default() }
 }
 
 pub(crate) fn config() -> impl Strategy<Value = Config> {
@@ -195,23 +317,43 @@ pub(crate) fn config() -> impl Strategy<Value = Config> {
             1 => spot(camera).boxed(),
             1 => point(camera).boxed(),
         ];
-        let unit = || [0.0..1.0f64, 0.0..1.0, 0.0..1.0];
-        let receivers =
-            proptest::option::of((unit(), unit(), 0usize..4).prop_map(move |(a, b, flat)| {
-                let mut b = point_in_view(&camera, b);
-                let a = point_in_view(&camera, a);
-                // Some worlds are a flat floor.
-                if flat < 3 {
-                    b[flat] = a[flat];
-                }
-                Aabb::new(a, b)
-            }));
-        (Just(camera), light, receivers).prop_map(|(camera, light, receivers)| Config {
+        (Just(camera), light, receivers(camera)).prop_map(|(camera, light, receivers)| Config {
             camera,
             light,
-            bounds: Bounds { receivers, casters: receivers, ..Bounds::default() },
+            bounds: bounds(receivers),
         })
     })
+}
+
+/// Configurations as [`config`] gives, and with odd views and lights. Some lamps lie in the plane
+/// of a side of the receivers' box.
+pub(crate) fn odd_config() -> impl Strategy<Value = Config> {
+    odd_camera().prop_flat_map(|camera| {
+        let light = prop_oneof![
+            2 => sun(camera).boxed(),
+            1 => spot(camera).boxed(),
+            1 => point(camera).boxed(),
+            3 => odd_light(camera).boxed(),
+        ];
+        (Just(camera), light, receivers(camera), 0usize..12).prop_map(
+            |(camera, mut light, receivers, flush)| {
+                if let (Some(position), Some(b)) = (position_mut(&mut light), receivers) {
+                    if flush < 3 {
+                        position[flush] = b.min[flush];
+                    }
+                }
+                Config { camera, light, bounds: bounds(receivers) }
+            },
+        )
+    })
+}
+
+fn position_mut(light: &mut Light) -> Option<&mut DVec3> {
+    match light {
+        Light::Directional { .. } => None,
+        Light::Spot(spot) => Some(&mut spot.position),
+        Light::Point(point) => Some(&mut point.position),
+    }
 }
 
 /// A point of the view frustum: x and y across the image, z from near to far, denser near the
@@ -245,11 +387,14 @@ impl Config {
                 planes.push(Plane::through(b.max - camera.eye(), -axis));
             }
         }
-        if let Light::Spot(spot) = self.light {
-            let apex = spot.position - camera.eye();
-            let axis = spot.direction.normalize();
-            planes.push(Plane::through(apex + axis * spot.near, axis));
-            planes.push(Plane::through(apex + axis * spot.range, -axis));
+        match self.light {
+            Light::Spot(spot) if !spot.is_wide() => {
+                let apex = spot.position - camera.eye();
+                let axis = spot.direction.normalize();
+                planes.push(Plane::through(apex + axis * spot.near, axis));
+                planes.push(Plane::through(apex + axis * spot.range, -axis));
+            }
+            _ => {}
         }
         planes
     }
@@ -289,8 +434,10 @@ impl Config {
             Light::Directional { .. } => true,
             Light::Spot(spot) => {
                 let r = world - spot.position;
-                r.dot(spot.direction)
-                    > r.length() * spot.direction.length() * spot.half_angle_rad.cos()
+                let is_within = !spot.is_wide()
+                    || (r.length() <= spot.range && r.abs().max_element() >= spot.near);
+                let cos = spot.half_angle_rad.cos();
+                is_within && r.dot(spot.direction) > r.length() * spot.direction.length() * cos
             }
             Light::Point(point) => {
                 let r = world - point.position;
@@ -311,4 +458,177 @@ impl Config {
             .filter(|&p| self.sees(p))
             .collect()
     }
+}
+
+/// Boxes among a configuration's receivers, or in its view if it has none. Some are flat, some
+/// empty, some repeated and some out of sight. They are described by numbers that apply to any
+/// configuration.
+pub(crate) fn boxes() -> impl Strategy<Value = Vec<PartialBox>> {
+    let unit = || prop::array::uniform3(0.0..=1.0f64);
+    let within = (unit(), unit(), 0.0..=1.0f64, 0usize..6)
+        .prop_map(|(a, b, size, flat)| PartialBox::Within { a, b, size, flat });
+    let some = prop_oneof![
+        8 => within,
+        1 => Just(PartialBox::Empty),
+        1 => Just(PartialBox::SameAsLast),
+        1 => Just(PartialBox::OutOfSight),
+    ];
+    // Of the longer lists, some boxes are served in groups.
+    prop_oneof![
+        9 => prop::collection::vec(some.clone(), 1..12),
+        1 => prop::collection::vec(some, 40..160),
+    ]
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum PartialBox {
+    /// From a towards b, by the share `size` of the way; flat along the axis that `flat` names, if
+    /// any.
+    Within {
+        a: [f64; 3],
+        b: [f64; 3],
+        size: f64,
+        flat: usize,
+    },
+    Empty,
+    SameAsLast,
+    OutOfSight,
+}
+
+/// The boxes in world space.
+pub(crate) fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
+    let Config { camera, bounds, .. } = config;
+    let place = |n: [f64; 3]| match bounds.receivers {
+        Some(all) => all.min + all.size() * DVec3::from(n),
+        None => point_in_view(camera, n),
+    };
+    let mut parts: Vec<Aabb> = Vec::new();
+    for partial in boxes {
+        parts.push(match *partial {
+            PartialBox::Within { a, b, size, flat } => {
+                let a = place(a);
+                let mut b = a.lerp(place(b), size);
+                if flat < 3 {
+                    b[flat] = a[flat];
+                }
+                Aabb::new(a, b)
+            }
+            PartialBox::Empty => Aabb::EMPTY,
+            PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
+            PartialBox::OutOfSight => {
+                let behind = camera.eye() - camera.forward() * 3.0 * camera.far();
+                Aabb::new(behind, behind + camera.far() * 0.1)
+            }
+        });
+    }
+    parts
+}
+
+/// What is wrong with a plan: the kind, and a description.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub kind: &'static str,
+    pub what: String,
+}
+
+/// Checks that points which the camera sees in the light are served: each lands in its maps, its
+/// casters share its texel, lie nearer the light and are not culled, and its errors are at most the
+/// reported ones.
+pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Result<(), Fault> {
+    let check = |is_right: bool, kind: &'static str, what: &dyn Fn() -> String| {
+        if is_right { Ok(()) } else { Err(Fault { kind, what: what() }) }
+    };
+    // The rounding of world coordinates, as a share of the scene's size.
+    let rounding = config.camera.eye().abs().max_element() * 1e-15;
+    for &p in points {
+        let shares: f64 = plan.lookup(0, p).map(|(_, share)| share).sum();
+        check((shares - 1.0).abs() < 1e-9, "shares", &|| format!("of {shares} at {p}"))?;
+        for (index, _) in plan.lookup(0, p) {
+            let map = &plan.maps[index];
+            let [res_s, res_t] = map.resolution.map(f64::from);
+            // Depth is inversely proportional to the distance from a lamp. It has no digits left at
+            // distances that are so many times as large as the one where it begins.
+            let has_depth = match config.light {
+                Light::Directional { .. } => true,
+                Light::Spot(SpotLight { near, range, .. })
+                | Light::Point(PointLight { near, range, .. }) => range < 1e8 * near,
+            };
+            let nothing = |kind, at: DVec3| Fault { kind, what: format!("at {at}, {map:?}") };
+            let shadow = map.project(p).ok_or_else(|| nothing("behind the map", p))?;
+            let error =
+                map.perspective_error(&config.camera, p).ok_or_else(|| nothing("no error", p))?;
+            let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+            // Rounding in texels: its size in metres over a texel's width.
+            let slack_s = 1e-7 + rounding / (error.s * pixel * res_s);
+            let slack_t = 1e-7 + rounding / (error.t * pixel * res_t);
+            let is_within = |x: f64, slack: f64| (-slack..=1.0 + slack).contains(&x);
+            check(is_within(shadow.x, slack_s), "s", &|| format!("is {} at {p}", shadow.x))?;
+            check(is_within(shadow.y, slack_t), "t", &|| format!("is {} at {p}", shadow.y))?;
+            check(is_within(shadow.z, 1e-6), "depth", &|| format!("is {} at {p}", shadow.z))?;
+            let in_slab = map.slab_depth(shadow.truncate(), shadow.z);
+            let is_in_slab = !has_depth || is_within(in_slab, 1e-6);
+            check(is_in_slab, "depth in slab", &|| format!("is {in_slab} at {p}"))?;
+            let reported = map.error;
+            for (kind, error, largest) in [
+                ("error in s", error.s, reported.max_s),
+                ("error in t", error.t, reported.max_t),
+                ("largest error", error.worst, reported.max),
+            ] {
+                let is_most = error <= largest * (1.0 + 1e-6);
+                check(is_most, kind, &|| format!("{error} > {largest} at {p}"))?;
+            }
+            let reach = match config.light {
+                Light::Directional { .. } => 10.0 * config.camera.far(),
+                Light::Spot(spot) => 0.9 * p.distance(spot.position),
+                Light::Point(point) => 0.9 * p.distance(point.position),
+            };
+            let caster = p + config.light.direction_to_light(p) * reach;
+            let casts = map.project(caster).ok_or_else(|| nothing("no caster", caster))?;
+            // Under a spot light, texels are up to ten times narrower at the caster.
+            let metres = 3e-14 * (config.camera.eye().length() + reach);
+            let texels = [error.s, error.t].map(|e| 1e-4 + metres / (e * pixel));
+            let off = [(casts - shadow).x * res_s, (casts - shadow).y * res_t];
+            let is_same = (0..2).all(|i| off[i].abs() < texels[i]);
+            check(is_same, "caster's texel", &|| format!("{casts} from {shadow} at {p}"))?;
+            let is_nearer = !has_depth || casts.z < shadow.z;
+            check(is_nearer, "caster's depth", &|| format!("{} over {}", casts.z, shadow.z))?;
+            let is_kept = map.may_cast(Aabb::new(caster, caster));
+            check(is_kept, "caster culled", &|| format!("at {caster}, {map:?}"))?;
+            if !has_depth {
+                continue;
+            }
+            let beam = map.beam(shadow.truncate()).ok_or_else(|| nothing("no beam", shadow))?;
+            let off = (p - beam.origin).reject_from_normalized(beam.direction).length();
+            let most = 1e-5 * pixel + 1e-5 * error.worst * pixel + 10.0 * rounding;
+            check(off <= most, "beam", &|| format!("misses by {off} of {most}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks that all numbers of a plan are finite, that directions are of unit length, and that each
+/// map's largest error is at least its errors in s and in t.
+pub(crate) fn check_numbers(plan: &Plan) -> Result<(), Fault> {
+    for map in &plan.maps {
+        let check = |is_right: bool, kind| {
+            if is_right { Ok(()) } else { Err(Fault { kind, what: format!("{map:?}") }) }
+        };
+        let matrices = [map.shadow_from_local, map.local_from_shadow];
+        check(matrices.iter().all(|m| m.is_finite()), "matrices not finite")?;
+        check(map.shadow_from_local_f32().is_finite(), "matrix not finite in single precision")?;
+        check(map.lambda.is_none_or(|l| l > 0.0 && l.is_finite()), "lambda")?;
+        check(map.split.iter().all(|d| d.is_finite()), "split")?;
+        let mut planes = map.cell.iter().chain(&map.caster_planes).chain(&map.fade_from);
+        check(planes.all(|p| p.normal.is_normalized() && p.offset.is_finite()), "planes")?;
+        let MapError { max_s, max_t, max } = map.error;
+        check([max_s, max_t, max].iter().all(|e| e.is_finite()), "errors not finite")?;
+        check(max >= max_s && max >= max_t, "largest error below those in s and t")?;
+        check(map.storage_factor.is_finite(), "storage factor")?;
+        let slab = match map.slab {
+            Slab::Leaning { slope, begin, thickness } => [slope.x, slope.y, begin, thickness, 1.0],
+            Slab::Distances { axis, near, far } => [axis.length(), near, far, far - near, 1.0],
+        };
+        check(slab.iter().all(|x| x.is_finite()) && slab[3] > 0.0, "slab")?;
+    }
+    Ok(())
 }
