@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Spread, WARPS, config, map_count, partition, planner, possible, technique};
+use common::{Spread, WARPS, config, map_count, partition, planner, possible, reach, technique};
 use proptest::prelude::*;
 use umbrage::{Aabb, Light, Objective, Technique, Warp};
 
@@ -49,7 +49,7 @@ proptest! {
                 return Err(TestCaseError::fail(format!("{name}: {p} is behind the map")));
             };
             let error = map.perspective_error(&config.camera, p).unwrap();
-            let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+            let pixel = config.camera.pixel_width(config.camera.depth(p));
             // Rounding in texels: its size in metres over a texel's width.
             let slack_s = 1e-7 + rounding / (error.s * pixel * res_s);
             let slack_t = 1e-7 + rounding / (error.t * pixel * res_t);
@@ -64,7 +64,7 @@ proptest! {
             prop_assert!(error.worst <= map.error.max * bound, "{name}: {} > {}", error.worst, map.error.max);
 
             let reach = match config.light {
-                Light::Directional { .. } => 10.0 * config.camera.far(),
+                Light::Directional { .. } => 10.0 * reach(&config.camera),
                 Light::Spot(spot) => 0.9 * p.distance(spot.position),
                 Light::Point(point) => 0.9 * p.distance(point.position),
             };
@@ -134,14 +134,15 @@ fn check_maxima(spreads: &[(&str, Spread)]) {
                 let map = &plan.maps[0];
                 prop_assert!(!map.is_empty());
                 let forward = config.camera.forward();
+                let width = |p: &glam::DVec3| config.camera.pixel_width(p.dot(forward));
                 let mut reached = [0f64; 3];
                 for (i, a) in corners.iter().enumerate() {
                     for b in &corners[..=i] {
                         for k in 0..=40 {
                             // The points are spread evenly in the image, so the share of b grows
-                            // with 1/z.
+                            // with 1/z in perspective views.
                             let k = f64::from(k) / 40.0;
-                            let (to_a, to_b) = ((1.0 - k) * b.dot(forward), k * a.dot(forward));
+                            let (to_a, to_b) = ((1.0 - k) * width(b), k * width(a));
                             let p = config.camera.eye() + a.lerp(*b, to_b / (to_a + to_b));
                             if let Some(e) = map.perspective_error(&config.camera, p) {
                                 for (r, e) in reached.iter_mut().zip([e.s, e.t, e.worst]) {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Config, WARPS, config, partition, planner, possible, technique};
+use common::{Config, WARPS, config, partition, planner, possible, reach, technique};
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{Aabb, Bounds, BoxTree, Faces, Light, Partition, Plan, Splits, Technique, Warp};
@@ -63,8 +63,9 @@ fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
             PartialBox::Empty => Aabb::EMPTY,
             PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
             PartialBox::OutOfSight => {
-                let behind = camera.eye() - camera.forward() * 3.0 * camera.far();
-                Aabb::new(behind, behind + camera.far() * 0.1)
+                let size = reach(camera);
+                let behind = camera.eye() - camera.forward() * 3.0 * size;
+                Aabb::new(behind, behind + size * 0.1)
             }
         });
     }
@@ -129,7 +130,7 @@ proptest! {
                     return Err(TestCaseError::fail(format!("{name}: {p} is behind the map")));
                 };
                 let error = map.perspective_error(&config.camera, p).unwrap();
-                let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+                let pixel = config.camera.pixel_width(config.camera.depth(p));
                 // Rounding in shadow coordinates: its size in metres relative to a texel's.
                 let [slack_s, slack_t] = [(error.s, 0), (error.t, 1)].map(|(texel, axis)| {
                     1e-7 + rounding / (texel * pixel * f64::from(map.resolution[axis]))
@@ -142,7 +143,7 @@ proptest! {
                     prop_assert!(found <= largest * (1.0 + 1e-6), "{name}: {error:?} {:?}", map.error);
                 }
                 let reach = match config.light {
-                    Light::Directional { .. } => 10.0 * config.camera.far(),
+                    Light::Directional { .. } => 10.0 * reach(&config.camera),
                     Light::Spot(spot) => 0.9 * p.distance(spot.position),
                     Light::Point(point) => 0.9 * p.distance(point.position),
                 };
@@ -184,7 +185,7 @@ proptest! {
         prop_assume!(partition.splits != Splits::Fitted);
         let partition = Partition { faces: Faces::Whole, ..possible(partition, spread) };
         let technique = Technique { partition, ..technique(spread) };
-        let far = config.camera.far();
+        let far = reach(&config.camera);
         let around_view = Aabb::new(config.camera.eye() - 9.0 * far, config.camera.eye() + 9.0 * far);
         let all = config.bounds.receivers.unwrap_or(around_view);
         // Flat boxes are given a thickness that depends on the size of what is seen.

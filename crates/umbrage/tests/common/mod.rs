@@ -4,8 +4,8 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, Objective, Partition, Plane,
-    Planner, PointLight, Splits, SpotLight, Technique, Warp,
+    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, Objective, Orthographic, Partition,
+    Plane, Planner, PointLight, Splits, SpotLight, Technique, Warp,
 };
 
 /// How a map's texels are spread, and what the map covers.
@@ -72,6 +72,7 @@ fn log_range(lo: f64, hi: f64) -> impl Strategy<Value = f64> {
     (lo.ln()..hi.ln()).prop_map(f64::exp)
 }
 
+/// Perspective and orthographic views.
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     let eye = prop_oneof![
         3 => Just(1.0),
@@ -87,19 +88,32 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
         log_range(0.01, 10.0),
         log_range(1.001, 1e4),
         prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
+        orthographic_height(),
     )
-        .prop_map(|(eye, forward, up, fov, near, ratio, image)| {
-            Camera::look_at(LookAt {
-                eye,
-                target: eye + forward,
-                up,
-                fov_y_rad: fov.to_radians(),
-                near,
-                far: near * ratio,
-                image,
-            })
-            .expect("a valid camera")
+        .prop_map(|(eye, forward, up, fov, near, ratio, image, height)| {
+            let (target, far) = (eye + forward, near * ratio);
+            let camera = match height {
+                None => {
+                    let fov_y_rad = fov.to_radians();
+                    Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
+                }
+                // The near plane of some views lies at the eye or behind it.
+                Some((height, before_eye)) => {
+                    let length = far - near;
+                    let near = near.min(length) * before_eye;
+                    let (height, far) = (height * length, near + length);
+                    Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
+                }
+            };
+            camera.expect("a valid camera")
         })
+}
+
+/// The height of an orthographic view over its range of depths, and where it begins; `None` for
+/// perspective views.
+fn orthographic_height() -> impl Strategy<Value = Option<(f64, f64)>> {
+    let begin = prop_oneof![2 => Just(1.0), 1 => Just(0.0), 1 => -2.0..1.0f64];
+    proptest::option::weighted(0.4, (log_range(0.01, 100.0), begin))
 }
 
 /// Partitions of every kind; one in three is a single map.
@@ -162,7 +176,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
         move |([x, y, z], from, half, distance)| {
             let seen = point_in_view(&camera, [x, y, z]);
-            let distance = distance * camera.far();
+            let distance = distance * reach(&camera);
             Light::Spot(SpotLight {
                 position: seen - from * distance,
                 direction: from,
@@ -178,7 +192,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
 fn point(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.0..1.0f64, 0.0..1.0, 0.0..1.0], direction(), log_range(1e-3, 3.0)).prop_map(
         move |(place, away, distance)| {
-            let distance = distance * camera.far();
+            let distance = distance * reach(&camera);
             Light::Point(PointLight {
                 position: point_in_view(&camera, place) + away * distance,
                 near: distance * 0.01,
@@ -214,12 +228,30 @@ pub(crate) fn config() -> impl Strategy<Value = Config> {
     })
 }
 
-/// A point of the view frustum: x and y across the image, z from near to far, denser near the
-/// viewer.
+/// A point of the view frustum: x and y across the image, z from near to far, in perspective views
+/// denser near the viewer.
 pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
     let [w, h] = camera.image().map(f64::from);
-    let depth = camera.near() * (camera.far() / camera.near()).powf(z);
-    camera.eye() + camera.ray(glam::DVec2::new(x * w, y * h)) * depth
+    let (near, far) = (camera.near(), camera.far());
+    let is_orthographic = camera.is_orthographic();
+    let depth = if is_orthographic { near + (far - near) * z } else { near * (far / near).powf(z) };
+    camera.eye() + camera.ray(glam::DVec2::new(x * w, y * h)).at(depth)
+}
+
+/// The smallest length that matters to a camera's maps, metres.
+pub(crate) fn detail(camera: &Camera) -> f64 {
+    let height = camera.pixel_width(camera.near()) * f64::from(camera.image()[1]);
+    if camera.is_orthographic() { height.min(camera.far() - camera.near()) } else { camera.near() }
+}
+
+/// The largest distance from the eye at which a camera sees anything, metres.
+pub(crate) fn reach(camera: &Camera) -> f64 {
+    let [w, h] = camera.image().map(f64::from);
+    [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]
+        .into_iter()
+        .flat_map(|(x, y)| [camera.near(), camera.far()].map(|z| (x, y, z)))
+        .map(|(x, y, z)| camera.ray(glam::DVec2::new(x, y)).at(z).length())
+        .fold(0.0, f64::max)
 }
 
 impl Config {
@@ -230,11 +262,15 @@ impl Config {
         let [w, h] = camera.image().map(f64::from);
         let corner = |x, y| camera.ray(glam::DVec2::new(x, y));
         let rays = [corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h)];
+        let middle = corner(w / 2.0, h / 2.0).at(camera.far());
         let mut planes: Vec<Plane> = (0..4)
             .map(|i| {
-                let n = rays[i].cross(rays[(i + 1) % 4]).normalize();
-                let inwards = if n.dot(camera.forward()) < 0.0 { -n } else { n };
-                Plane { normal: inwards, offset: 0.0 }
+                let [a, b] = [rays[i], rays[(i + 1) % 4]];
+                let across = b.at(1.0) - a.at(1.0);
+                let plane = Plane::through(a.start, a.direction.cross(across).normalize());
+                let is_inside = plane.distance(middle) >= 0.0;
+                let sign = if is_inside { 1.0 } else { -1.0 };
+                Plane { normal: plane.normal * sign, offset: plane.offset * sign }
             })
             .collect();
         planes.push(Plane { normal: camera.forward(), offset: -camera.near() });
@@ -258,7 +294,7 @@ impl Config {
     /// inside the others.
     pub(crate) fn corners(&self) -> Vec<DVec3> {
         let planes = self.half_spaces();
-        let slack = 1e-9 * self.camera.far();
+        let slack = 1e-9 * reach(&self.camera);
         let mut corners = Vec::new();
         for (i, a) in planes.iter().enumerate() {
             for (j, b) in planes[..i].iter().enumerate() {
@@ -280,7 +316,7 @@ impl Config {
     /// Whether the camera sees `world` in the light and within the bounds.
     pub(crate) fn sees(&self, world: DVec3) -> bool {
         let local = world - self.camera.eye();
-        let slack = 1e-12 * self.camera.far();
+        let slack = 1e-12 * reach(&self.camera);
         self.half_spaces().iter().all(|p| p.distance(local) >= -slack) && self.lights(world)
     }
 
