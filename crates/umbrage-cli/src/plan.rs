@@ -348,7 +348,7 @@ fn side_name(side: CubeSide) -> &'static str {
 
 /// The message for a plan in which all maps are empty.
 fn nothing_served(view: &ChosenView) -> String {
-    let [near, far] = [view.look_at.near, view.look_at.far].map(six_digits);
+    let [near, far] = [view.camera.near(), view.camera.far()].map(six_digits);
     format!("nothing lit between {near} and {far} metres of the view receives shadows")
 }
 

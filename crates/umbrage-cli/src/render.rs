@@ -57,7 +57,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(args.aov);
     if needs.motion {
-        Motion::Away.check(FRAMES, chosen.look_at, light)?;
+        Motion::Away.check(FRAMES, &chosen, light)?;
     }
     tell_notices(&scene);
     announce(&executors);
@@ -72,8 +72,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let bar = Bar::new(map_rows + height * needs.passes(), quiet);
     let mut picture = Picture::trace(args, needs, &render_scene, &view, &plan, &bar)?;
     if needs.motion {
-        let (scene, receivers, look_at) = (&render_scene, &receivers, chosen.look_at);
-        let moving = MovingView { scene, receivers, look_at, light, samples: 1 };
+        let (scene, receivers, chosen_view) = (&render_scene, &receivers, &chosen);
+        let moving = MovingView { scene, receivers, chosen_view, light, samples: 1 };
         let techniques = std::slice::from_ref(&args.shadows);
         let noise = noise(Motion::Away, FRAMES, &moving, techniques, &bar)?.swap_remove(0);
         picture.noise = noise.pixels;

@@ -7,6 +7,7 @@ use anyhow::Result;
 use glam::DVec3;
 use umbrage::Light;
 use umbrage_measure::{Image, Rgb};
+use umbrage_scene::Lens;
 use umbrage_trace::Tracer;
 
 /// Renders two trees with each technique. Light from the side throws long, thin shadows on the
@@ -18,7 +19,7 @@ fn trees(techniques: &[(String, String)]) -> Result<Vec<(String, Image<Rgb>)>> {
     let shot = Shot::new(&scene, &tracer, light, |view| {
         view.eye = DVec3::new(9.0, 5.0, 13.0);
         view.target = DVec3::new(4.9, 0.5, 0.6);
-        view.fov_y_rad = 0.22;
+        view.lens = Lens::Perspective { fov_y_rad: 0.22 };
     })?;
     let picture = |(label, spec): &(String, String)| Ok((label.clone(), shot.picture(spec)?));
     techniques.iter().map(picture).collect()

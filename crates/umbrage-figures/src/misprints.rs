@@ -67,7 +67,7 @@ fn found() -> Result<Vec<Misprint>> {
         quantity: "pixel's width w_i at z = 10 m",
         printed: width / n,
         corrected: width,
-        measured: z * left.distance(right),
+        measured: left.at(z).distance(right.at(z)),
     };
 
     let overhead = Overhead::new(view, lambda)?;

@@ -5,10 +5,10 @@ use anyhow::Result;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
-use umbrage::{Bounds, Camera, Light, LookAt};
+use umbrage::{Bounds, Camera, Light};
 use umbrage_lab::{NamedTechnique, Rows, Shadowed};
 use umbrage_measure::{Image, PngPixel, Rgb, png};
-use umbrage_scene::Scene;
+use umbrage_scene::{Scene, SceneCamera};
 use umbrage_trace::{Reference, Tracer, View};
 
 /// Width and height of one picture, pixels.
@@ -30,11 +30,11 @@ impl<'a> Shot<'a> {
         scene: &Scene,
         tracer: &'a Tracer<'a>,
         light: Light,
-        change: impl FnOnce(&mut LookAt),
+        change: impl FnOnce(&mut SceneCamera),
     ) -> Result<Self> {
-        let mut view = scene.default_view().look_at(TILE);
+        let mut view = scene.default_view();
         change(&mut view);
-        let camera = Camera::look_at(view)?;
+        let camera = view.camera(TILE)?;
         Ok(Self { tracer, bounds: Bounds::of_scene(scene.bounds()), camera, light })
     }
 

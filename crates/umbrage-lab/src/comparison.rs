@@ -108,7 +108,7 @@ impl<'a> Comparison<'a> {
     /// # Errors
     /// An error if a frame's view is not one that a camera can have, or if the light cannot turn.
     pub fn check_motion(&self, motion: Motion, frames: u32) -> Result<(), Error> {
-        motion.check(frames, self.chosen_view.look_at, self.chosen_light.light)
+        motion.check(frames, &self.chosen_view, self.chosen_light.light)
     }
 
     fn height(&self) -> u64 {
@@ -181,7 +181,7 @@ impl Compared<'_> {
         let moving = MovingView {
             scene: &prepared.render,
             receivers: &prepared.receivers,
-            look_at: chosen_view.look_at,
+            chosen_view,
             light: chosen_light.light,
             samples: options.samples,
         };

@@ -19,6 +19,8 @@ pub enum Field {
     Up,
     /// Vertical field of view.
     Fov,
+    /// The height of what an orthographic view shows.
+    Ortho,
     /// Near distance of the view.
     Near,
     /// Far distance of the view.
@@ -64,6 +66,7 @@ impl Field {
             Self::Target => "target",
             Self::Up => "up",
             Self::Fov => "fov",
+            Self::Ortho => "ortho",
             Self::Near => "near",
             Self::Far => "far",
             Self::Size => "size",
@@ -86,8 +89,8 @@ impl Field {
 
     /// Returns whether the views in a sweep's file have this field, with its name as the key.
     pub(crate) fn is_of_view(self) -> bool {
-        use Field::{Camera, Eye, Far, Fov, Light, Near, Scene, Size, Sun, Target, Up};
-        [Scene, Eye, Target, Up, Fov, Near, Far, Size, Camera, Sun, Light].contains(&self)
+        use Field::{Camera, Eye, Far, Fov, Light, Near, Ortho, Scene, Size, Sun, Target, Up};
+        [Scene, Eye, Target, Up, Fov, Ortho, Near, Far, Size, Camera, Sun, Light].contains(&self)
     }
 }
 
@@ -99,8 +102,9 @@ impl Display for Field {
 }
 
 /// Names of a camera's and a light's values in a [`PlanError`], and the fields that give them.
-const PLANNED: [(&str, Field); 8] = [
+const PLANNED: [(&str, Field); 9] = [
     ("camera.fov_y_rad", Field::Fov),
+    ("camera.height", Field::Ortho),
     ("camera.image", Field::Size),
     ("camera.eye", Field::Eye),
     ("camera.target", Field::Target),

@@ -70,9 +70,8 @@ impl Receivers {
         }
         let [width, height] = camera.image();
         let depth = |x: u32, y: u32| {
-            let direction = camera.ray(DVec2::new(f64::from(x), f64::from(y)) + 0.5);
-            let ray = Ray { origin: camera.eye(), direction };
-            // The ray's direction has depth 1, so its parameter t is the depth.
+            let ray = Ray::of_view(camera, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+            // The ray's parameter t is the depth.
             tracer.closest(ray, [camera.near(), f64::INFINITY]).map_or(f64::INFINITY, |hit| hit.t)
         };
         let depths: Vec<f64> = (0..height)

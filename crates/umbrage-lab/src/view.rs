@@ -4,19 +4,22 @@ use crate::error::{Error, Field};
 use crate::scene::find;
 use crate::values;
 use glam::DVec3;
-use umbrage::{Aabb, Camera, LookAt};
-use umbrage_scene::{Scene, SceneCamera};
+use umbrage::{Aabb, Camera};
+use umbrage_scene::{Lens, Scene, SceneCamera};
 
 /// Default values of a view, for what neither the user nor the scene gives.
-const DEFAULT_VIEW: LookAt = LookAt {
+const DEFAULT_VIEW: SceneCamera = SceneCamera {
+    name: String::new(),
     eye: DVec3::ZERO,
     target: DVec3::NEG_Z,
     up: DVec3::Y,
-    fov_y_rad: std::f64::consts::FRAC_PI_3,
+    lens: Lens::Perspective { fov_y_rad: std::f64::consts::FRAC_PI_3 },
     near: 0.1,
     far: 100.0,
-    image: [960, 540],
 };
+
+/// Width and height of pictures where none are given, pixels.
+const DEFAULT_SIZE: [u32; 2] = [960, 540];
 
 /// The view that a user asks for. Values that are left out come from the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,8 +30,10 @@ pub struct ViewOptions {
     pub target: Option<DVec3>,
     /// Upward direction in the picture, of any length; cannot be combined with `camera`.
     pub up: Option<DVec3>,
-    /// Vertical field of view, degrees, 0.01 to 179.
+    /// Vertical field of view of a perspective view, degrees, 0.01 to 179.
     pub fov_deg: Option<f64>,
+    /// Height of what an orthographic view shows, metres; cannot be combined with `fov_deg`.
+    pub ortho: Option<f64>,
     /// Near distance of the view, metres, above 0.
     pub near: Option<f64>,
     /// Far distance of the view, metres, above `near`.
@@ -47,9 +52,10 @@ impl Default for ViewOptions {
             target: None,
             up: None,
             fov_deg: None,
+            ortho: None,
             near: None,
             far: None,
-            size: DEFAULT_VIEW.image,
+            size: DEFAULT_SIZE,
             camera: None,
         }
     }
@@ -73,11 +79,15 @@ impl ViewOptions {
         each(Field::Target, self.target, values::position)?;
         each(Field::Up, self.up, values::pointing)?;
         each(Field::Fov, self.fov_deg, values::opening)?;
+        each(Field::Ortho, self.ortho, values::metres)?;
         each(Field::Near, self.near, values::metres)?;
         each(Field::Far, self.far, values::metres)?;
         let own = [(Field::Eye, self.eye), (Field::Target, self.target), (Field::Up, self.up)];
         if let Some(&(by, _)) = own.iter().find(|(_, v)| self.camera.is_some() && v.is_some()) {
             return Err(Error::Excluded { field: Field::Camera, by });
+        }
+        if self.fov_deg.is_some() && self.ortho.is_some() {
+            return Err(Error::Excluded { field: Field::Fov, by: Field::Ortho });
         }
         match (self.near, self.far) {
             (Some(near), Some(far)) if near >= far => return Err(Error::Ends { near, far }),
@@ -95,24 +105,29 @@ impl ViewOptions {
 pub struct ChosenView {
     /// Name of the scene's camera, if the view is that of a camera and was not changed.
     pub name: Option<String>,
-    /// The view's eye, target, field of view, depth range and picture size.
-    pub look_at: LookAt,
-    /// The same view in the form that the planner takes.
+    /// The view's eye, target, lens and depth range.
+    pub view: SceneCamera,
+    /// The same view in the form that the planner takes, with the picture's size.
     pub camera: Camera,
 }
 
 impl ChosenView {
     /// Returns the view in the form that reports show.
     pub fn info(&self) -> umbrage_measure::View {
-        let look_at = &self.look_at;
+        let SceneCamera { eye, target, up, lens, near, far, .. } = self.view;
+        let (fov, ortho) = match lens {
+            Lens::Perspective { fov_y_rad } => (Some(fov_y_rad.to_degrees()), None),
+            Lens::Orthographic { height } => (None, Some(height)),
+        };
         umbrage_measure::View {
             name: self.name.clone(),
-            eye: look_at.eye.to_array(),
-            target: look_at.target.to_array(),
-            up: look_at.up.to_array(),
-            fov: look_at.fov_y_rad.to_degrees(),
-            near: look_at.near,
-            far: look_at.far,
+            eye: eye.to_array(),
+            target: target.to_array(),
+            up: up.to_array(),
+            fov,
+            ortho,
+            near,
+            far,
         }
     }
 }
@@ -128,31 +143,36 @@ pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<Chose
         (None, ..) | (_, Some(_), Some(_)) => None,
         (Some(scene), ..) => Some(scene_camera(options, scene)?),
     };
-    let base = own.as_ref().map_or(DEFAULT_VIEW, |c| c.look_at(options.size));
-    let mut look_at = LookAt {
+    let base = own.clone().unwrap_or(DEFAULT_VIEW);
+    let lens = match (options.fov_deg, options.ortho) {
+        (Some(deg), _) => Lens::Perspective { fov_y_rad: deg.to_radians() },
+        (None, Some(height)) => Lens::Orthographic { height },
+        (None, None) => base.lens,
+    };
+    let mut view = SceneCamera {
         eye: options.eye.unwrap_or(base.eye),
         target: options.target.unwrap_or(base.target),
         up: options.up.unwrap_or(base.up),
-        fov_y_rad: options.fov_deg.map_or(base.fov_y_rad, f64::to_radians),
+        lens,
         near: options.near.unwrap_or(base.near),
         far: options.far.unwrap_or(base.far),
-        image: options.size,
+        name: base.name,
     };
     let moved = options.eye.is_some() || options.target.is_some();
     if let Some(scene) = scene
         && moved
     {
-        let [near, far] = depth_range(&look_at, scene.bounds());
-        look_at.far = options.far.unwrap_or(far.max(options.near.unwrap_or(0.0) * 2.0));
-        look_at.near = options.near.unwrap_or(near.min(look_at.far / 2.0));
+        let [near, far] = depth_range(&view, options.size, scene.bounds());
+        view.far = options.far.unwrap_or(far.max(options.near.unwrap_or(0.0) * 2.0));
+        view.near = options.near.unwrap_or(near.min(view.far / 2.0));
     }
-    let camera = Camera::look_at(look_at).map_err(Error::Planning)?;
-    let numbers = [options.near, options.far, options.fov_deg];
+    let camera = view.camera(options.size).map_err(Error::Planning)?;
+    let numbers = [options.near, options.far, options.fov_deg, options.ortho];
     let changed = numbers.iter().any(Option::is_some) || options.up.is_some();
     let name = own.map(|c| c.name).filter(|name| {
         !moved && !changed && scene.is_some_and(|s| s.cameras.iter().any(|c| c.name == *name))
     });
-    Ok(ChosenView { name, look_at, camera })
+    Ok(ChosenView { name, view, camera })
 }
 
 fn scene_camera(options: &ViewOptions, scene: &Scene) -> Result<SceneCamera, Error> {
@@ -162,17 +182,20 @@ fn scene_camera(options: &ViewOptions, scene: &Scene) -> Result<SceneCamera, Err
 }
 
 /// Returns near and far distances for a view from any position. The far distance is where the scene
-/// ends. The near distance is where it begins, but at least a thousandth of the far distance.
-fn depth_range(look_at: &LookAt, bounds: Aabb) -> [f64; 2] {
-    let forward = (look_at.target - look_at.eye).normalize_or(DVec3::NEG_Z);
-    let far = bounds.corners().iter().map(|&c| forward.dot(c - look_at.eye)).fold(0.0, f64::max);
+/// ends. The near distance is where it begins, but at least a thousandth of the far distance; in
+/// orthographic views it is 0.
+fn depth_range(view: &SceneCamera, size: [u32; 2], bounds: Aabb) -> [f64; 2] {
+    let &SceneCamera { eye, target, lens, .. } = view;
+    let forward = (target - eye).normalize_or(DVec3::NEG_Z);
+    let far = bounds.corners().iter().map(|&c| forward.dot(c - eye)).fold(0.0, f64::max);
     let far = if far > 0.0 { far * 1.01 } else { 100.0 };
-    let distance = look_at.eye.distance(look_at.eye.clamp(bounds.min, bounds.max));
+    let Lens::Perspective { fov_y_rad } = lens else { return [0.0, far] };
+    let distance = eye.distance(eye.clamp(bounds.min, bounds.max));
     // The scene's nearest point may lie in a corner of the picture, where the depth is less than
     // the distance.
     let corner = {
-        let tan_y = (look_at.fov_y_rad / 2.0).tan();
-        let tan_x = tan_y * f64::from(look_at.image[0]) / f64::from(look_at.image[1]);
+        let tan_y = (fov_y_rad / 2.0).tan();
+        let tan_x = tan_y * f64::from(size[0]) / f64::from(size[1]);
         (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt()
     };
     [(distance / corner).max(far / 1000.0), far]

@@ -37,8 +37,11 @@ pub struct View {
     pub target: [f64; 3],
     /// The direction that is up in the picture.
     pub up: [f64; 3],
-    /// Vertical field of view, degrees.
-    pub fov: f64,
+    /// Vertical field of view, degrees; `None` for an orthographic view.
+    pub fov: Option<f64>,
+    /// Height of what an orthographic view shows, metres; `None` for a perspective view.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ortho: Option<f64>,
     /// Near distance along the view direction, metres.
     pub near: f64,
     /// Far distance along the view direction, metres.
@@ -231,7 +234,8 @@ pub(crate) mod tests {
                 eye: [0.0, 2.0, 0.0],
                 target: [0.0, 2.0, -1.0],
                 up: [0.0, 1.0, 0.0],
-                fov: 60.0,
+                fov: Some(60.0),
+                ortho: None,
                 near: 0.1,
                 far: 500.0,
             },

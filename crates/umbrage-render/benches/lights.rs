@@ -13,8 +13,9 @@
 
 use glam::{DQuat, DVec3};
 use std::time::Instant;
-use umbrage::{Bounds, BoxTree, Camera, Light, LookAt, Planner, Size, SpotLight, Technique};
+use umbrage::{Bounds, BoxTree, Light, Planner, Size, SpotLight, Technique};
 use umbrage_render::{Drawn, Gpu, Renderer, SceneBuffers};
+use umbrage_scene::SceneCamera;
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
 
@@ -48,7 +49,7 @@ fn main() -> Result<(), Failure> {
     let buffers = SceneBuffers::new(&gpu, &scene, false)?;
     let boxes = BoxTree::new(&Tracer::new(&scene)?.boxes(256))?;
     let bounds = Bounds { receiver_parts: Some(&boxes), ..Bounds::of_scene(scene.bounds()) };
-    let look = scene.cameras[0].look_at([1920, 1080]);
+    let look = &scene.cameras[0];
     println!("{} instances, {} lights", scene.instances.len(), scene.lights.len());
     let motions = [
         ("nothing moves", Motion::Nothing),
@@ -74,7 +75,7 @@ fn run(
     buffers: &SceneBuffers<'_>,
     bounds: &Bounds<'_>,
     technique: &Technique,
-    look: LookAt,
+    look: &SceneCamera,
     mut lights: Vec<Light>,
     motion: Motion,
 ) -> Result<(), Failure> {
@@ -89,7 +90,7 @@ fn run(
     let mut drawn: Vec<Vec<(usize, Drawn)>> = Vec::new();
     let mut maps = [0; 2];
     for frame in 0..FRAMES {
-        let mut look = look;
+        let mut look = look.clone();
         let swing = (f64::from(frame) * 0.2).sin();
         match motion {
             Motion::Nothing => {}
@@ -107,7 +108,7 @@ fn run(
                 }
             }
         }
-        let camera = Camera::look_at(look)?;
+        let camera = look.camera([1920, 1080])?;
         let start = Instant::now();
         let plan = planner.plan(&camera, &lights, bounds, technique)?;
         let planned = start.elapsed();

@@ -293,8 +293,12 @@ impl<'g, 's> Renderer<'g, 's> {
         readback: &mut SeenReadback,
     ) -> Result<Option<SeenTiles>, Error> {
         let (device, queue) = (self.gpu.device(), self.gpu.queue());
-        // Depth is reversed and the far plane infinitely far.
-        let projection = DepthProjection::of_range(camera.near(), f64::INFINITY, true)?;
+        // As `ViewUniform` has it.
+        let projection = if camera.is_orthographic() {
+            DepthProjection::orthographic(camera.near(), self.scene.farthest(camera), true)?
+        } else {
+            DepthProjection::of_range(camera.near(), f64::INFINITY, true)?
+        };
         let mut encoder = device.create_command_encoder(&Default::default());
         readback.encode(device, queue, &mut encoder, &target.depth, projection, camera)?;
         queue.submit([encoder.finish()]);
@@ -325,7 +329,7 @@ impl<'g, 's> Renderer<'g, 's> {
             self.eye == DVec3::ZERO || self.eye == camera.eye(),
             "render space is the eye's"
         );
-        let view = ViewUniform::new(camera, light, light_index, tile);
+        let view = ViewUniform::new(camera, light, light_index, tile, scene.farthest(camera));
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
         let planes = tile.planes(camera);
         instances.begin(scene, camera.eye());

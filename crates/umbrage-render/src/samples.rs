@@ -83,7 +83,7 @@ impl Renderer<'_, '_> {
 impl Sample {
     fn new(radiance_visibility: Vec4, normal_depth: Vec4, texel: Vec4) -> Self {
         let visibility = radiance_visibility.w;
-        let is_sky = normal_depth.w <= 0.0;
+        let is_sky = normal_depth == Vec4::ZERO;
         let map = (texel.z >= 0.0).then_some(texel.z as u32);
         Self {
             radiance: radiance_visibility.truncate(),

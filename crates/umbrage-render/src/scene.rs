@@ -2,7 +2,7 @@ use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
-use umbrage::Aabb;
+use umbrage::{Aabb, Camera};
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
@@ -25,6 +25,8 @@ pub struct SceneBuffers<'a> {
     pub(crate) material_layout: BindGroupLayout,
     /// The instances that have triangles, those of one mesh next to each other.
     pub(crate) instances: Vec<Drawable>,
+    /// A box around all instances.
+    bounds: Aabb,
 }
 
 /// An instance of a mesh.
@@ -130,6 +132,7 @@ impl<'a> SceneBuffers<'a> {
         });
         let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
         instances.sort_by_key(|i| i.mesh);
+        let bounds = instances.iter().fold(Aabb::EMPTY, |all, i| all.union(i.bounds));
         let buffers = Self {
             scene,
             positions: gpu.buffer(
@@ -147,6 +150,7 @@ impl<'a> SceneBuffers<'a> {
             materials: materials.list,
             material_layout,
             instances,
+            bounds,
         };
         gpu.check()?;
         Ok(buffers)
@@ -158,6 +162,14 @@ impl<'a> SceneBuffers<'a> {
     }
 
     /// Whether a mesh has holes where its material's alpha is low.
+    /// A distance along the view beyond which nothing lies, past the near plane, metres.
+    pub(crate) fn farthest(&self, camera: &Camera) -> f64 {
+        let corners = self.instances.first().map(|_| self.bounds.corners());
+        let depths = corners.into_iter().flatten().map(|corner| camera.depth(corner));
+        let farthest = depths.fold(camera.far(), f64::max);
+        farthest + 0.01 * (farthest - camera.near())
+    }
+
     pub(crate) fn is_masked(&self, mesh: usize) -> bool {
         self.materials[self.meshes[mesh].material].mask.is_some()
     }

@@ -1,8 +1,8 @@
 //! The uniform with camera and light for the forward shader.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec2, DVec3, Mat4, Vec3, Vec4};
-use umbrage::{Camera, Light, Plane};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3, Vec4};
+use umbrage::{Camera, Light, Plane, ViewRay};
 use umbrage_scene::daylight;
 
 /// The struct `View` of `wgsl/forward.wgsl`.
@@ -21,7 +21,7 @@ pub(crate) struct ViewUniform {
     pub(crate) light_direction: Vec3,
     pub(crate) light_index: u32,
     pub(crate) light_position: Vec3,
-    pub(crate) padding: f32,
+    pub(crate) is_orthographic: u32,
     pub(crate) sun: Vec4,
     pub(crate) sky_light: Vec4,
     pub(crate) ground_light: Vec4,
@@ -52,11 +52,18 @@ impl Tile {
         DVec2::new(left + x, top + y) / f64::from(self.grid)
     }
 
-    /// The ray of unit depth through the upper left corner of the tile, and its change per sample
-    /// to the right and downwards.
-    fn rays(&self, camera: &Camera) -> [DVec3; 3] {
+    /// The line of sight through the upper left corner of the tile, and its change per sample to the
+    /// right and downwards.
+    fn rays(&self, camera: &Camera) -> [ViewRay; 3] {
         let corner = camera.ray(self.pixel(0.0, 0.0));
-        let step = |x, y| (camera.ray(self.pixel(x, y)) - corner) / (x + y);
+        let step = |x, y| {
+            let ray = camera.ray(self.pixel(x, y));
+            let change = |to: DVec3, from: DVec3| (to - from) / (x + y);
+            ViewRay {
+                start: change(ray.start, corner.start),
+                direction: change(ray.direction, corner.direction),
+            }
+        };
         let [width, height] = self.size.map(f64::from);
         [corner, step(width, 0.0), step(0.0, height)]
     }
@@ -68,8 +75,10 @@ impl Tile {
         let rays = corners.map(|(x, y)| camera.ray(self.pixel(x, y)));
         let middle = camera.ray(self.pixel(w / 2.0, h / 2.0));
         let side = |i: usize| {
-            let normal = rays[i].cross(rays[(i + 1) % 4]).normalize_or_zero();
-            Plane::through(camera.eye(), if normal.dot(middle) < 0.0 { -normal } else { normal })
+            let [a, b] = [rays[i], rays[(i + 1) % 4]];
+            let normal = (b.at(1.0) - a.at(1.0)).cross(a.direction).normalize_or_zero();
+            let is_inwards = normal.dot(middle.at(1.0) - a.at(1.0)) >= 0.0;
+            Plane::through(camera.eye() + a.start, if is_inwards { normal } else { -normal })
         };
         let near =
             Plane::through(camera.eye() + camera.forward() * camera.near(), camera.forward());
@@ -78,26 +87,39 @@ impl Tile {
 }
 
 impl ViewUniform {
-    /// The uniform for a tile. Render space is relative to the eye.
-    pub(crate) fn new(camera: &Camera, light: &Light, light_index: u32, tile: &Tile) -> Self {
+    /// The uniform for a tile. Render space is relative to the eye. Nothing lies beyond `farthest`,
+    /// metres along the view.
+    pub(crate) fn new(
+        camera: &Camera,
+        light: &Light,
+        light_index: u32,
+        tile: &Tile,
+        farthest: f64,
+    ) -> Self {
         let [ray, ray_x, ray_y] = tile.rays(camera);
+        let is_orthographic = camera.is_orthographic();
         let forward = camera.forward();
         let [width, height] = tile.size.map(f64::from);
-        // A point p is depth · (ray + x ray_x + y ray_y), which is solved here for x and y. The
-        // steps are perpendicular to each other.
-        let across = |step: DVec3, n: f64, sign: f64| {
-            let per_depth = step / step.length_squared();
-            let sample = per_depth - forward * per_depth.dot(ray);
-            (sample * (2.0 / n) - forward) * sign
+        // A point of depth z is (ray + x ray_x + y ray_y).at(z), which is solved here for x and y.
+        // The steps are perpendicular to each other. Either the lines' directions change from sample
+        // to sample, or their starts.
+        let across = |step: ViewRay, n: f64, sign: f64| {
+            let step = step.start + step.direction;
+            let per_step = step * (2.0 / (n * step.length_squared()));
+            if is_orthographic {
+                return per_step.extend(-per_step.dot(ray.start) - 1.0) * sign;
+            }
+            ((per_step - forward * per_step.dot(ray.direction)) - forward).extend(0.0) * sign
         };
-        // Depth is reversed and the far plane infinitely far. Surfaces nearer than the near
-        // distance are clipped.
-        let rows = [
-            across(ray_x, width, 1.0).extend(0.0),
-            across(ray_y, height, -1.0).extend(0.0),
-            DVec3::ZERO.extend(camera.near()),
-            forward.extend(0.0),
-        ];
+        // Depth is reversed. In perspective views the far plane is infinitely far. Surfaces nearer
+        // than the near distance are clipped.
+        let (depth, w) = if is_orthographic {
+            let length = farthest - camera.near();
+            (-forward.extend(-farthest) / length, DVec4::W)
+        } else {
+            (DVec4::W * camera.near(), forward.extend(0.0))
+        };
+        let rows = [across(ray_x, width, 1.0), across(ray_y, height, -1.0), depth, w];
         let clip_from_render = DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
         let (light_kind, direction, position, light_range, cosine) = match light {
             Light::Directional { direction } => {
@@ -117,18 +139,18 @@ impl ViewUniform {
         let color = |c: Vec3| c.extend(0.0);
         Self {
             clip_from_render: clip_from_render.as_mat4(),
-            ray: ray.as_vec3(),
+            ray: ray.direction.as_vec3(),
             grid: tile.grid as f32,
-            ray_x: ray_x.as_vec3(),
+            ray_x: (ray_x.start + ray_x.direction).as_vec3(),
             light_kind,
-            ray_y: ray_y.as_vec3(),
+            ray_y: (ray_y.start + ray_y.direction).as_vec3(),
             light_range: light_range.min(f64::from(f32::MAX)) as f32,
             forward: forward.as_vec3(),
             light_cosine: cosine as f32,
             light_direction: direction.as_vec3(),
             light_index,
             light_position: position.as_vec3(),
-            padding: 0.0,
+            is_orthographic: is_orthographic.into(),
             sun: color(daylight::SUN),
             sky_light: color(daylight::SKY_LIGHT),
             ground_light: color(daylight::GROUND_LIGHT),
@@ -144,7 +166,7 @@ impl ViewUniform {
 mod tests {
     use super::*;
     use std::mem::offset_of;
-    use umbrage::LookAt;
+    use umbrage::{LookAt, Orthographic};
 
     #[test]
     fn the_shader_reads_what_is_written() {
@@ -161,7 +183,7 @@ mod tests {
         }
         let ours = offsets![
             clip_from_render ray grid ray_x light_kind ray_y light_range forward light_cosine
-            light_direction light_index light_position padding sun sky_light ground_light zenith
+            light_direction light_index light_position is_orthographic sun sky_light ground_light zenith
             horizon nadir glow
         ];
         let theirs: Vec<_> =
@@ -172,22 +194,27 @@ mod tests {
 
     #[test]
     fn points_land_on_their_samples() {
-        let camera = Camera::look_at(LookAt {
-            eye: DVec3::new(100.0, 5.0, -30.0),
-            target: DVec3::new(90.0, 4.0, -33.0),
-            up: DVec3::Y,
-            fov_y_rad: 1.1,
-            near: 0.5,
-            far: 90.0,
-            image: [320, 200],
-        })
-        .unwrap();
+        let (eye, target, up) =
+            (DVec3::new(100.0, 5.0, -30.0), DVec3::new(90.0, 4.0, -33.0), DVec3::Y);
+        let (near, far, image) = (0.5, 90.0, [320, 200]);
+        let (fov_y_rad, height) = (1.1, 17.0);
+        let perspective = LookAt { eye, target, up, fov_y_rad, near, far, image };
+        let orthographic = Orthographic { eye, target, up, height, near, far, image };
+        let perspective = Camera::look_at(perspective).unwrap();
+        let orthographic = Camera::orthographic(orthographic).unwrap();
+        let depth_at = |depth: f64| [0.5 / depth, (100.0 - depth) / 99.5];
+        for (camera, kind) in [(perspective, 0), (orthographic, 1)] {
+            land_on_samples(&camera, |depth| depth_at(depth)[kind]);
+        }
+    }
+
+    fn land_on_samples(camera: &Camera, depth_at: impl Fn(f64) -> f64) {
         let sun = Light::Directional { direction: -DVec3::Y };
         let tile = Tile { origin: [64, 100], size: [128, 50], grid: 3 };
-        let view = ViewUniform::new(&camera, &sun, 0, &tile);
+        let view = ViewUniform::new(camera, &sun, 0, &tile, 100.0);
         for (x, y, depth) in [(0.0, 0.0, 0.5), (128.0, 50.0, 7.0), (31.5, 20.5, 80.0)] {
             let pixel = DVec2::new((64.0 + x) / 3.0, (100.0 + y) / 3.0);
-            let local = (camera.ray(pixel) * depth).as_vec3();
+            let local = camera.ray(pixel).at(depth).as_vec3();
             let clip = view.clip_from_render * local.extend(1.0);
             let ndc = clip / clip.w;
             let at = DVec2::new(
@@ -195,8 +222,8 @@ mod tests {
                 f64::from(0.5 - 0.5 * ndc.y) * 50.0,
             );
             assert!((at - DVec2::new(x, y)).length() < 1e-3, "{at}");
-            assert!((f64::from(ndc.z) - 0.5 / depth).abs() < 1e-6);
-            for plane in tile.planes(&camera) {
+            assert!((f64::from(ndc.z) - depth_at(depth)).abs() < 1e-6);
+            for plane in tile.planes(camera) {
                 assert!(plane.distance(camera.eye() + local.as_dvec3()) > -1e-5);
             }
         }

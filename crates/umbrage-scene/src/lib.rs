@@ -16,6 +16,6 @@ pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;
 pub use load::{files, load};
 pub use types::{
-    Alpha, Instance, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture, TextureId,
-    Wrap,
+    Alpha, Instance, Lens, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture,
+    TextureId, Wrap,
 };

@@ -1,5 +1,5 @@
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
-use umbrage::{Aabb, Light, LookAt};
+use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
 
 /// A scene: triangles, their materials and transforms, cameras and lights.
 #[derive(Clone, Debug, Default)]
@@ -113,19 +113,44 @@ pub struct SceneCamera {
     pub target: DVec3,
     /// The direction that is up in the picture.
     pub up: DVec3,
-    /// Vertical field of view, radians.
-    pub fov_y_rad: f64,
+    /// How much of the scene the picture shows.
+    pub lens: Lens,
     /// Near distance, metres.
     pub near: f64,
     /// Far distance, metres; always finite.
     pub far: f64,
 }
 
+/// How much of a scene a camera's picture shows from bottom to top.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// A perspective view.
+    Perspective {
+        /// Vertical field of view, radians.
+        fov_y_rad: f64,
+    },
+    /// An orthographic view.
+    Orthographic {
+        /// Height of what the picture shows, metres.
+        height: f64,
+    },
+}
+
 impl SceneCamera {
-    /// The camera's parameters for a picture of `image` pixels (width, height).
-    pub fn look_at(&self, image: [u32; 2]) -> LookAt {
-        let Self { eye, target, up, fov_y_rad, near, far, .. } = *self;
-        LookAt { eye, target, up, fov_y_rad, near, far, image }
+    /// The camera with a picture of `image` pixels (width, height).
+    ///
+    /// # Errors
+    /// Names the value that no camera can have.
+    pub fn camera(&self, image: [u32; 2]) -> Result<Camera, umbrage::Error> {
+        let Self { eye, target, up, lens, near, far, .. } = *self;
+        match lens {
+            Lens::Perspective { fov_y_rad } => {
+                Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
+            }
+            Lens::Orthographic { height } => {
+                Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
+            }
+        }
     }
 }
 

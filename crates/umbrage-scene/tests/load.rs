@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use umbrage::{Light, PointLight, SpotLight};
-use umbrage_scene::{Alpha, Scene, SceneError, Wrap, load};
+use umbrage_scene::{Alpha, Lens, Scene, SceneError, Wrap, load};
 
 /// Sine and cosine of 45°, which quaternions of a quarter turn consist of.
 const QUARTER: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -422,17 +422,45 @@ fn cameras_look_along_minus_z() {
         "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}}),
     );
     let scene = file.load().unwrap();
-    let [camera] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
+    let [camera, _] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
     assert_eq!(camera.name, "eye");
     assert!((camera.eye - DVec3::Y * 3.0).length() < 1e-9);
     let forward = (camera.target - camera.eye).normalize();
     assert!((forward - DVec3::NEG_X).length() < 1e-6, "{forward}");
     assert!((camera.up - DVec3::Y).length() < 1e-6);
-    assert!((camera.fov_y_rad - 0.8).abs() < 1e-6);
+    let Lens::Perspective { fov_y_rad } = camera.lens else { panic!("{:?}", camera.lens) };
+    assert!((fov_y_rad - 0.8).abs() < 1e-6);
     // The file states no far distance, so it follows from the scene.
     assert!(camera.near < camera.far && camera.far.is_finite());
     assert_eq!(scene.default_view(), *camera);
-    assert!(notices(&scene)[0].contains("not a perspective camera"), "{:?}", notices(&scene));
+    assert!(notices(&scene).is_empty(), "{:?}", notices(&scene));
+}
+
+/// Orthographic cameras show twice `ymag` from bottom to top, whatever the node's scale.
+#[test]
+fn orthographic_cameras() {
+    let camera = |orthographic: serde_json::Value| {
+        let mut file = File::triangle().set("/nodes/0", json!({"mesh": 0, "children": [1]}));
+        file.push(
+            "nodes",
+            json!({"camera": 0, "name": "plan", "translation": [0, 3, 0], "scale": [2, 2, 2]}),
+        );
+        file.push("cameras", json!({"type": "orthographic", "orthographic": orthographic}));
+        file.load().unwrap()
+    };
+    let scene = camera(json!({"xmag": 4.0, "ymag": 1.5, "znear": 0.0, "zfar": 9.0}));
+    let [found] = &scene.cameras[..] else { panic!("{:?}", scene.cameras) };
+    assert_eq!(found.lens, Lens::Orthographic { height: 3.0 });
+    assert_eq!((found.eye, found.near, found.far), (DVec3::Y * 3.0, 0.0, 9.0));
+    assert!(found.camera([640, 480]).unwrap().is_orthographic());
+    assert!(notices(&scene).is_empty(), "{:?}", notices(&scene));
+    for [ymag, znear, zfar] in
+        [[0.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [1.0, 2.0, 1.0], [1.0, -1.0, 1.0]]
+    {
+        let scene = camera(json!({"xmag": 1.0, "ymag": ymag, "znear": znear, "zfar": zfar}));
+        assert!(scene.cameras.is_empty(), "{:?}", scene.cameras);
+        assert!(notices(&scene)[0].contains("needs 0 < ymag"), "{:?}", notices(&scene));
+    }
 }
 
 #[test]

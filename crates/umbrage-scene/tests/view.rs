@@ -11,7 +11,7 @@ fn real(file: &str) -> Scene {
 }
 
 fn camera(view: &SceneCamera) -> Camera {
-    Camera::look_at(view.look_at([1280, 720])).unwrap()
+    view.camera([1280, 720]).unwrap()
 }
 
 fn sun_elevation_deg(scene: &Scene) -> f64 {

@@ -62,7 +62,8 @@ pub use reference::{DepthMap, MapTexel, Reference};
 pub use samples::{Band, Sample, View};
 pub use tracer::{Hit, PrimitiveRef, Surface, Tracer};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+use umbrage::Camera;
 
 /// A ray: the points `origin + t direction` for all t in a range that each query states. A range
 /// that begins below zero extends the ray behind its origin.
@@ -73,6 +74,15 @@ pub struct Ray {
     /// Direction in world space, of any length but zero. The parameter t counts lengths of
     /// `direction`.
     pub direction: DVec3,
+}
+
+impl Ray {
+    /// The line of sight through a point of the picture, given in pixels as for [`Camera::ray`]. The
+    /// parameter t is the depth.
+    pub fn of_view(camera: &Camera, pixel: DVec2) -> Self {
+        let sight = camera.ray(pixel);
+        Self { origin: camera.eye() + sight.start, direction: sight.direction }
+    }
 }
 
 /// A callback that is told how many more rows are done. Any thread may call it.

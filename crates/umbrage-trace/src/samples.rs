@@ -114,11 +114,11 @@ impl<'a> View<'a> {
     /// where the sky shows. Surfaces nearer than the camera's near distance are not seen. Surfaces
     /// beyond its far distance are seen, but no shadow map serves them.
     pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
-        let ray = Ray { origin: self.camera.eye(), direction: self.camera.ray(pixel) };
+        let ray = Ray::of_view(&self.camera, pixel);
         let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
         let surface = self.tracer.surface(&hit, ray.direction);
         let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
-        // The ray's direction has depth 1, so its parameter t is the depth.
+        // The ray's parameter t is the depth.
         Some(Sample { surface, depth: hit.t, is_facing })
     }
 
@@ -126,14 +126,17 @@ impl<'a> View<'a> {
     /// outside the picture or nearer than the camera's near distance, is hidden, or its visible
     /// side faces away.
     pub fn sees(&self, surface: &Surface) -> Option<Sample> {
-        let to_eye = self.camera.eye() - surface.position;
         let depth = self.camera.depth(surface.position);
         let pixel = self.camera.pixel(surface.position)?;
+        // Towards the eye, with the share of the way to the near plane, which nothing nearer hides.
+        let (to_eye, end) = if self.camera.is_orthographic() {
+            (-self.camera.forward(), depth - self.camera.near())
+        } else {
+            (self.camera.eye() - surface.position, 1.0 - self.camera.near() / depth)
+        };
         let size = glam::UVec2::from(self.camera.image()).as_dvec2();
         let is_inside = pixel.cmpge(DVec2::ZERO).all() && pixel.cmple(size).all();
         let is_towards = surface.geometric_normal.dot(to_eye) > 0.0;
-        // Surfaces nearer to the eye than the near distance hide nothing.
-        let end = 1.0 - self.camera.near() / depth;
         let is_seen = is_inside
             && is_towards
             && end >= 0.0

@@ -75,7 +75,7 @@ fn window(relative_distance: f64) -> f32 {
 
 /// Linear colour of the sky at a point of the picture, which is given in pixels.
 pub fn sky(light: &Light, camera: &Camera, pixel: DVec2) -> Vec3 {
-    let direction = camera.ray(pixel).normalize();
+    let direction = camera.ray(pixel).direction.normalize();
     let height = direction.y as f32;
     let gradient = if height >= 0.0 {
         HORIZON.lerp(ZENITH, 1.0 - (1.0 - height).powi(3))
@@ -125,9 +125,14 @@ pub fn normal_color(normal: DVec3) -> [u8; 3] {
 }
 
 /// Depth (metres) as grey, from white at the camera's near distance to black at its far distance,
-/// on a logarithmic scale: equal ratios of depth are equal steps of grey.
+/// on a logarithmic scale: equal ratios of depth are equal steps of grey. In orthographic views equal
+/// differences are.
 pub fn depth_color(camera: &Camera, depth: f64) -> [u8; 3] {
-    let relative = (depth / camera.near()).ln() / (camera.far() / camera.near()).ln();
+    let (near, far) = (camera.near(), camera.far());
+    let relative = match camera.is_orthographic() {
+        true => (depth - near) / (far - near),
+        false => (depth / near).ln() / (far / near).ln(),
+    };
     [((1.0 - relative.clamp(0.0, 1.0)) * 255.0).round() as u8; 3]
 }
 

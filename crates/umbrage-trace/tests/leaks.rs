@@ -46,7 +46,7 @@ fn exact(plan: &Plan, depths: &DepthMap, receiver: &Receiver) -> f64 {
 fn leaks(scene: &Scene, statistics: &[Statistic]) -> Vec<[f64; 2]> {
     let tracer = Tracer::new(scene).unwrap();
     let v = scene.default_view();
-    let camera = Camera::look_at(v.look_at([480, 270])).unwrap();
+    let camera = v.camera([480, 270]).unwrap();
     let light = scene.default_light().light;
     let boxes = BoxTree::new(&tracer.boxes(256)).unwrap();
     let bounds = Bounds { receiver_parts: Some(&boxes), ..Bounds::of_scene(scene.bounds()) };

@@ -78,7 +78,7 @@ fn a_real_level_comes_out_right() {
 fn a_built_in_world_comes_out_right() {
     let scene = umbrage_scene::builtin("airfield", None).unwrap();
     let tracer = Tracer::new(&scene).unwrap();
-    let camera = Camera::look_at(scene.default_view().look_at([480, 270])).unwrap();
+    let camera = scene.default_view().camera([480, 270]).unwrap();
     comes_out_right(&tracer, camera, scene.default_light().light);
 }
 

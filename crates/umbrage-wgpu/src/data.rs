@@ -122,9 +122,12 @@ impl Lookup {
             pixel_gradient: {
                 let local_from_render = placed.render_origin - plan.origin;
                 let gradient = plan.pixel_gradient;
-                gradient.extend(gradient.dot(local_from_render)).as_vec4()
+                (gradient + DVec4::W * gradient.dot(local_from_render.extend(0.0))).as_vec4()
             },
-            eye: (plan.origin - placed.render_origin).extend(1.0).as_vec4(),
+            eye: {
+                let render_from_local = plan.origin - placed.render_origin;
+                (plan.viewer + (render_from_local * plan.viewer.w).extend(0.0)).as_vec4()
+            },
         };
     }
 

@@ -17,18 +17,22 @@ use wgpu::{
 };
 
 /// How the depths of a depth buffer follow from distances along the view direction: depth =
-/// `at_infinity` + `per_inverse_metre` / distance. Every perspective projection is of this form.
+/// `base` + `per_nearness` · nearness. Nearness is 1/distance under every perspective projection,
+/// and −distance under every orthographic one, as in [`SeenTile`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthProjection {
-    /// The depth infinitely far away.
-    pub at_infinity: f64,
-    /// The change of depth per 1/m of inverse distance; positive if depth is reversed.
-    pub per_inverse_metre: f64,
+    /// The depth of nearness 0: infinitely far away, or for an orthographic projection at the eye.
+    pub base: f64,
+    /// The change of depth per 1/m of nearness, or per metre; positive if depth is reversed.
+    pub per_nearness: f64,
+    /// Whether the projection is orthographic, as the camera then must be.
+    pub is_orthographic: bool,
 }
 
 impl DepthProjection {
-    /// The depths of a projection matrix with wgpu's clip space, of either handedness, reversed or
-    /// not. The far plane may be infinitely far.
+    /// The depths of a perspective projection matrix with wgpu's clip space, of either handedness,
+    /// reversed or not. The far plane may be infinitely far. (The matrix of an orthographic
+    /// projection does not tell where the viewer looks: take [`orthographic`](Self::orthographic).)
     ///
     /// # Errors
     /// [`Error::Invalid`] if this is no perspective projection.
@@ -46,10 +50,11 @@ impl DepthProjection {
                 ),
             });
         }
-        Ok(Self { at_infinity: z.z / w.z, per_inverse_metre: z.w / w.z.abs() })
+        let (base, per_nearness) = (z.z / w.z, z.w / w.z.abs());
+        Ok(Self { base, per_nearness, is_orthographic: false })
     }
 
-    /// The depths between these distances, metres. `far` may be infinite. Reversed depths are 1 at
+    /// The depths of a perspective projection between these distances, metres. `far` may be infinite. Reversed depths are 1 at
     /// the near distance.
     ///
     /// # Errors
@@ -62,32 +67,62 @@ impl DepthProjection {
             });
         }
         // Depth is (near⁻¹ − z⁻¹)/(near⁻¹ − far⁻¹), which is 0 at the near distance.
-        let per_inverse_metre = -(near.recip() - far.recip()).recip();
-        let at_infinity = -per_inverse_metre / near;
-        Ok(if is_reversed {
-            Self { at_infinity: 1.0 - at_infinity, per_inverse_metre: -per_inverse_metre }
-        } else {
-            Self { at_infinity, per_inverse_metre }
-        })
+        let per_nearness = -(near.recip() - far.recip()).recip();
+        let forward = Self { base: -per_nearness / near, per_nearness, is_orthographic: false };
+        Ok(if is_reversed { forward.reversed() } else { forward })
     }
 
-    fn check(self) -> Result<(), Error> {
-        let Self { at_infinity, per_inverse_metre } = self;
-        if at_infinity.is_finite() && per_inverse_metre.is_finite() && per_inverse_metre != 0.0 {
-            return Ok(());
+    /// The depths of an orthographic projection between these distances, metres, of any sign.
+    /// Reversed depths are 1 at the near distance.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] unless `near` < `far` and both are finite.
+    pub fn orthographic(near: f64, far: f64, is_reversed: bool) -> Result<Self, Error> {
+        if !(near < far && near.is_finite() && far.is_finite()) {
+            return Err(Error::Invalid {
+                field: "depth.near",
+                problem: format!("must be less than depth.far ({far}), both finite, is {near}"),
+            });
         }
-        Err(Error::Invalid {
-            field: "depth",
-            problem: format!("must be finite and depend on the distance, is {self:?}"),
-        })
+        let per_nearness = -(far - near).recip();
+        let forward = Self { base: near * per_nearness, per_nearness, is_orthographic: true };
+        Ok(if is_reversed { forward.reversed() } else { forward })
+    }
+
+    fn reversed(self) -> Self {
+        Self { base: 1.0 - self.base, per_nearness: -self.per_nearness, ..self }
+    }
+
+    fn check(self, camera: &Camera) -> Result<(), Error> {
+        let Self { base, per_nearness, is_orthographic } = self;
+        let invalid = |problem| Err(Error::Invalid { field: "depth", problem });
+        if !(base.is_finite() && per_nearness.is_finite() && per_nearness != 0.0) {
+            return invalid(format!("must be finite and depend on the distance, is {self:?}"));
+        }
+        if is_orthographic != camera.is_orthographic() {
+            let kind =
+                |is_orthographic| if is_orthographic { "orthographic" } else { "perspective" };
+            return invalid(format!(
+                "must have the camera's kind of projection, which is {}, is {}",
+                kind(camera.is_orthographic()),
+                kind(is_orthographic)
+            ));
+        }
+        Ok(())
     }
 
     fn is_reversed(self) -> bool {
-        self.per_inverse_metre > 0.0
+        self.per_nearness > 0.0
     }
 
-    fn inverse(self, depth: f64) -> f64 {
-        (depth - self.at_infinity) / self.per_inverse_metre
+    /// The depth at a distance along the view, metres.
+    fn depth(self, distance: f64) -> f64 {
+        let nearness = if self.is_orthographic { -distance } else { distance.recip() };
+        self.base + self.per_nearness * nearness
+    }
+
+    fn nearness(self, depth: f64) -> f64 {
+        (depth - self.base) / self.per_nearness
     }
 }
 
@@ -96,7 +131,7 @@ impl DepthProjection {
 /// to what is seen.
 ///
 /// One compute pass reads each depth a few times. It takes any size, multisampled depths too, and
-/// any perspective projection.
+/// any perspective or orthographic projection.
 #[derive(Debug)]
 pub struct SeenReadback {
     layouts: [BindGroupLayout; 2],
@@ -229,7 +264,7 @@ impl SeenReadback {
     ///
     /// # Errors
     /// [`Error::Invalid`] if the texture cannot be read, is smaller than the picture, or if the
-    /// projection is not finite.
+    /// projection is not finite or not of the camera's kind.
     pub fn encode(
         &mut self,
         device: &Device,
@@ -239,19 +274,18 @@ impl SeenReadback {
         projection: DepthProjection,
         camera: &Camera,
     ) -> Result<(), Error> {
-        projection.check()?;
+        projection.check(camera)?;
         check_depths(depth, camera)?;
         self.collect();
         let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) else {
             return Ok(());
         };
         let is_multisampled = usize::from(depth.texture().sample_count() > 1);
-        let farthest = SeenTiles::BEYOND * camera.far();
         let picture = Picture {
             size: camera.image(),
             background: if projection.is_reversed() { 0.0 } else { 1.0 },
-            limit: (projection.at_infinity + projection.per_inverse_metre / farthest) as f32,
-            toward: projection.per_inverse_metre.signum() as f32,
+            limit: projection.depth(SeenTiles::farthest(camera)) as f32,
+            toward: projection.per_nearness.signum() as f32,
             padding: 0.0,
         };
         queue.write_buffer(&slot.picture, 0, bytemuck::bytes_of(&picture));
@@ -329,7 +363,7 @@ impl SeenReadback {
 }
 
 impl Pending {
-    /// The tile in inverse distances.
+    /// The tile in nearness.
     fn tile(&self, tile: &Tile) -> Option<SeenTile> {
         if tile.is_seen == 0.0 {
             return None;
@@ -344,14 +378,14 @@ impl Pending {
         };
         let [lo, hi] = tile.depths.to_array().map(f64::from);
         let slack = step + 2f64.powi(-22) * base.abs().max(lo.abs()).max(hi.abs());
-        let mut inverse = [base + lo - slack, base + hi + slack].map(|d| projection.inverse(d));
+        let mut nearness = [base + lo - slack, base + hi + slack].map(|d| projection.nearness(d));
         if !projection.is_reversed() {
-            inverse.reverse();
+            nearness.reverse();
         }
-        let per_depth = projection.per_inverse_metre.recip();
+        let per_depth = projection.per_nearness.recip();
         let slope = DVec2::from(tile.slope.to_array().map(f64::from)) * per_depth;
         let jump = f64::from(tile.jump) * per_depth.abs();
-        Some(SeenTile { pixels: tile.pixels.to_array().map(f64::from), slope, inverse, jump })
+        Some(SeenTile { pixels: tile.pixels.to_array().map(f64::from), slope, nearness, jump })
     }
 }
 
@@ -407,25 +441,32 @@ mod tests {
         for (near, far) in [(0.1, 50.0), (2.0, f64::INFINITY)] {
             for is_reversed in [false, true] {
                 let of_range = DepthProjection::of_range(near, far, is_reversed).unwrap();
-                let depth =
-                    |distance: f64| of_range.at_infinity + of_range.per_inverse_metre / distance;
                 let ends = if is_reversed { [1.0, 0.0] } else { [0.0, 1.0] };
-                assert!((depth(near) - ends[0]).abs() < 1e-12, "{of_range:?}");
-                assert!((depth(far) - ends[1]).abs() < 1e-12, "{of_range:?}");
+                assert!((of_range.depth(near) - ends[0]).abs() < 1e-12, "{of_range:?}");
+                assert!((of_range.depth(far) - ends[1]).abs() < 1e-12, "{of_range:?}");
                 for sign in [1.0, -1.0] {
                     // z looks along ±z: clip z = a z + b, clip w = ±z.
-                    let z = DVec4::new(
-                        0.0,
-                        0.0,
-                        of_range.at_infinity * sign,
-                        of_range.per_inverse_metre,
-                    );
+                    let z = DVec4::new(0.0, 0.0, of_range.base * sign, of_range.per_nearness);
                     let rows = [DVec4::X, DVec4::Y, z * 3.0, DVec4::Z * sign * 3.0];
                     let matrix = DMat4::from_cols_array_2d(&rows.map(|r| r.to_array())).transpose();
                     let of_matrix = DepthProjection::of_matrix(matrix).unwrap();
-                    let error = (of_matrix.at_infinity - of_range.at_infinity).abs()
-                        + (of_matrix.per_inverse_metre - of_range.per_inverse_metre).abs();
+                    let error = (of_matrix.base - of_range.base).abs()
+                        + (of_matrix.per_nearness - of_range.per_nearness).abs();
                     assert!(error < 1e-12, "{of_matrix:?} {of_range:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn orthographic_depths_run_from_end_to_end() {
+        for (near, far) in [(0.1, 50.0), (0.0, 2.0), (-7.0, -3.0), (-7.0, 3.0)] {
+            for is_reversed in [false, true] {
+                let depths = DepthProjection::orthographic(near, far, is_reversed).unwrap();
+                let ends = if is_reversed { [1.0, 0.0] } else { [0.0, 1.0] };
+                for (distance, end) in [near, far].into_iter().zip(ends) {
+                    assert!((depths.depth(distance) - end).abs() < 1e-12, "{depths:?}");
+                    assert!((depths.nearness(end) + distance).abs() < 1e-12, "{depths:?}");
                 }
             }
         }
@@ -443,6 +484,10 @@ mod tests {
         assert_eq!(field(nan), "depth.clip_from_view");
         for (near, far) in [(0.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0), (1.0, f64::NAN)] {
             let error = DepthProjection::of_range(near, far, true).unwrap_err();
+            assert_eq!(field(error), "depth.near");
+        }
+        for (near, far) in [(2.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
+            let error = DepthProjection::orthographic(near, far, true).unwrap_err();
             assert_eq!(field(error), "depth.near");
         }
     }

@@ -4,6 +4,7 @@
 //! the light in a parallelogram, the texel's [`Footprint`]. The footprint's size over the width of
 //! a pixel's image beam at that point, w_i = 2 z tan φ/res_i, is the *perspective* error: pixels
 //! per texel without regard to the surface's orientation (Lloyd et al. 2006, Eq. 1, first factor).
+//! In orthographic views w_i is the same everywhere, the picture's height over res_i.
 //! [`ShadowMap::surface_error`] also includes the exact second factor, the *projection* error.
 
 use crate::camera::Camera;
@@ -136,11 +137,10 @@ impl ShadowMap {
     }
 
     /// Perspective error at a world point seen by `camera`; `None` where the map does not apply or
-    /// the point lies behind the eye.
+    /// the point lies behind the eye of a perspective view.
     pub fn perspective_error(&self, camera: &Camera, world_position: DVec3) -> Option<PointError> {
-        let depth = camera.depth(world_position);
-        let footprint = self.footprint(world_position).filter(|_| depth > 0.0)?;
-        let pixel = depth * camera.pixel_width_per_depth();
+        let pixel = camera.pixel_width(camera.depth(world_position));
+        let footprint = self.footprint(world_position).filter(|_| pixel > 0.0)?;
         Some(PointError {
             s: footprint.base() / pixel,
             t: footprint.height() / pixel,
@@ -149,8 +149,8 @@ impl ShadowMap {
     }
 
     /// Error on a surface with the given normal (of any length, to either side) at a world point
-    /// seen by `camera`. `None` where the map does not apply, the point lies behind the eye, or the
-    /// normal has no direction.
+    /// seen by `camera`. `None` where the map does not apply, the point lies behind the eye of a
+    /// perspective view, or the normal has no direction.
     pub fn surface_error(
         &self,
         camera: &Camera,

@@ -90,7 +90,8 @@ const NONE: u8 = u8::MAX;
 impl Body {
     /// Replaces the body by the camera's frustum, relative to the eye.
     pub(crate) fn set_frustum(&mut self, camera: &Camera) {
-        let [near, far] = [camera.near(), camera.far()].map(|depth| camera.corners_at(depth));
+        let corners = |depth: f64| camera.edges().map(|edge| edge.at(depth));
+        let [near, far] = [camera.near(), camera.far()].map(corners);
         // The camera counts corners around the image, hexahedra by rows.
         let by_rows = |[a, b, c, d]: [DVec3; 4]| [a, b, d, c];
         let [[a, b, c, d], [e, f, g, h]] = [near, far].map(by_rows);
@@ -361,10 +362,13 @@ fn planes_around(aabb: Aabb) -> [Plane; 6] {
 /// The planes of the camera's frustum, relative to the eye, with their insides towards it.
 pub(crate) fn frustum_planes(camera: &Camera) -> [Plane; 6] {
     let forward = camera.forward();
-    let rays = camera.corners_at(1.0);
-    // The side planes pass through the eye exactly.
-    let side =
-        |i: usize| Plane { normal: rays[(i + 1) % 4].cross(rays[i]).normalize(), offset: 0.0 };
+    let edges = camera.edges();
+    // The side planes of perspective views pass through the eye exactly.
+    let side = |i: usize| {
+        let [a, b] = [edges[i], edges[(i + 1) % 4]];
+        let across = b.at(1.0) - a.at(1.0);
+        Plane::through(a.start, across.cross(a.direction).normalize())
+    };
     [
         Plane { normal: forward, offset: -camera.near() },
         Plane { normal: -forward, offset: camera.far() },

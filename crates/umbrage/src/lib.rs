@@ -59,7 +59,7 @@ mod worst;
 pub use atlas::{Atlas, AtlasTooLarge, Place, ScaleOffset};
 pub use bounds::{Aabb, Bounds, Plane};
 pub use box_tree::BoxTree;
-pub use camera::{Camera, ClipDepth, LookAt};
+pub use camera::{Camera, ClipDepth, LookAt, Orthographic, ViewRay};
 pub use error::Error;
 pub use light::{Light, PointLight, SpotLight};
 pub use plan::{

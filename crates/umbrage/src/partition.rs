@@ -11,7 +11,7 @@ use glam::{DVec3, DVec4};
 /// The ends of slices; entries after the last slice's end are not used.
 pub(crate) type Ends = [f64; Partition::MAX_SLICES + 1];
 
-/// The view frustum's faces as seen from a light, in local space. A partition uses those faces that
+/// The faces of a perspective view's frustum as seen from a light, in local space. A partition uses those faces that
 /// together cover what the light sees of the frustum exactly once: its front faces if the light
 /// comes from behind the viewer, otherwise its back faces (W&P §5.1). The near face is among them
 /// in both cases.
@@ -41,7 +41,7 @@ const AT_EYE: f64 = 1e-3;
 impl LitFaces {
     pub(crate) fn new(camera: &Camera, projector: &Projector, with_near: bool) -> Self {
         let light = homogeneous(projector, camera);
-        let rays = camera.corners_at(1.0);
+        let rays = camera.edges().map(|edge| edge.direction);
         let towards = light.truncate();
         let along_view = camera.forward().dot(towards);
         let is_behind = along_view <= 0.0;
@@ -186,15 +186,20 @@ impl Along {
 pub(crate) fn split(
     partition: &Partition,
     [n, f]: [f64; 2],
+    camera: &Camera,
     storage: impl FnMut(f64, f64) -> f64,
 ) -> Ends {
     let k = partition.slices as usize;
-    let self_similar = |i: usize| n * (f / n).powf(i as f64 / k as f64);
+    let scale = Scale::of(camera);
     let even = |i: usize| n + (f - n) * (i as f64 / k as f64);
+    let self_similar = |i: usize| match scale {
+        Scale::Logarithmic => n * (f / n).powf(i as f64 / k as f64),
+        Scale::Even => even(i),
+    };
     let mut ends = [f; Partition::MAX_SLICES + 1];
     ends[0] = n;
     if partition.splits == Splits::Fitted {
-        equalize(&mut ends[..=k], storage);
+        equalize(&mut ends[..=k], scale, storage);
         return ends;
     }
     for (i, end) in ends.iter_mut().enumerate().take(k).skip(1) {
@@ -205,6 +210,36 @@ pub(crate) fn split(
         };
     }
     ends
+}
+
+/// The scale on which slices of equal length have the same shape, and so need equally many texels
+/// where receivers fill the view.
+#[derive(Clone, Copy, Debug)]
+enum Scale {
+    /// That of perspective views: the picture grows with depth.
+    Logarithmic,
+    /// That of orthographic views.
+    Even,
+}
+
+impl Scale {
+    fn of(camera: &Camera) -> Self {
+        if camera.is_orthographic() { Self::Even } else { Self::Logarithmic }
+    }
+
+    fn position(self, depth: f64) -> f64 {
+        match self {
+            Self::Logarithmic => depth.ln(),
+            Self::Even => depth,
+        }
+    }
+
+    fn depth(self, position: f64) -> f64 {
+        match self {
+            Self::Logarithmic => position.exp(),
+            Self::Even => position,
+        }
+    }
 }
 
 /// The ratio of the largest storage of a fitted slice to the least from which one more step makes
@@ -223,26 +258,27 @@ const MOST_ENDS: usize = Partition::MAX_SLICES - 1;
 
 /// Moves all but the first and the last end so that all slices need similar storage.
 ///
-/// The unknowns are the logarithms of the ends, and what shall vanish are the differences between
+/// The unknowns are the positions of the ends on the scale, and what shall vanish are the differences between
 /// the logarithms of neighbouring storages. They are found by Broyden's method (1965). Storage can
 /// jump where a slice reaches a receiver, and then no ends may be right; of all ends tried, those
 /// whose storages differ least are taken.
-fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
+fn equalize(ends: &mut [f64], scale: Scale, mut storage: impl FnMut(f64, f64) -> f64) {
     let k = ends.len() - 1;
     let [n, f] = [ends[0], ends[k]];
     if k == 1 || f <= n {
         return;
     }
     let unknowns = k - 1;
-    let whole = (f / n).ln();
+    let first = scale.position(n);
+    let whole = scale.position(f) - first;
     let mut at: [f64; MOST_ENDS] =
-        std::array::from_fn(|i| n.ln() + whole * (i + 1) as f64 / k as f64);
-    let mut jacobian = model(whole / k as f64, unknowns);
+        std::array::from_fn(|i| first + whole * (i + 1) as f64 / k as f64);
+    let mut jacobian = model(scale, whole / k as f64, unknowns);
     let mut best = (f64::INFINITY, at);
     let mut useless = 0;
     let mut last: Option<[[f64; MOST_ENDS]; 2]> = None;
     for _ in 0..MOST_ROUNDS {
-        set_ends(ends, &at);
+        set_ends(ends, scale, &at);
         let mut needed = [0.0; Partition::MAX_SLICES];
         for (i, needed) in needed.iter_mut().enumerate().take(k) {
             *needed = storage(ends[i], ends[i + 1]);
@@ -281,7 +317,7 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
         for i in 0..k {
             let moves = |j: usize| if (1..k).contains(&j) { step[j - 1] } else { 0.0 };
             let shorter = moves(i) - moves(i + 1);
-            let length = (ends[i + 1] / ends[i]).ln();
+            let length = scale.position(ends[i + 1]) - scale.position(ends[i]);
             if -shorter > 0.5 * length {
                 share = share.min(0.5 * length / -shorter);
             }
@@ -294,24 +330,26 @@ fn equalize(ends: &mut [f64], mut storage: impl FnMut(f64, f64) -> f64) {
     // The last step, from slices that are nearly alike, is not tried. It also keeps slices from
     // jumping where the number of rounds changes.
     let is_sound = best.0 <= NEARLY_ALIKE && at.iter().all(|x| x.is_finite());
-    set_ends(ends, if is_sound { &at } else { &best.1 });
+    set_ends(ends, scale, if is_sound { &at } else { &best.1 });
 }
 
-/// Sets all but the first and the last end from their logarithms.
-fn set_ends(ends: &mut [f64], logarithms: &[f64]) {
+/// Sets all but the first and the last end from their positions on the scale.
+fn set_ends(ends: &mut [f64], scale: Scale, positions: &[f64]) {
     let k = ends.len() - 1;
     for i in 1..k {
-        ends[i] = logarithms[i - 1].exp().clamp(ends[i - 1], ends[k]);
+        ends[i] = scale.depth(positions[i - 1]).clamp(ends[i - 1], ends[k]);
     }
 }
 
 /// The derivatives of the differences between the logarithms of neighbouring storages, with respect
-/// to the logarithms of the ends. They are those of slices whose far ends are eˣ times their near
-/// ends: where receivers fill the view, the storage of an even map grows as e²ˣ − eˣ, and that of a
-/// warped one more slowly.
-fn model(x: f64, unknowns: usize) -> [[f64; MOST_ENDS]; MOST_ENDS] {
-    let even = 2.0 + 1.0 / x.exp_m1();
-    let growth = 0.5 * (even + 1.0 / x);
+/// to the positions of the ends. They are those of slices of length x on the scale: where receivers
+/// fill a perspective view, the storage of an even map grows as e²ˣ − eˣ, and that of a warped one
+/// more slowly. In an orthographic view it grows as x.
+fn model(scale: Scale, x: f64, unknowns: usize) -> [[f64; MOST_ENDS]; MOST_ENDS] {
+    let growth = match scale {
+        Scale::Logarithmic => 0.5 * (2.0 + 1.0 / x.exp_m1() + 1.0 / x),
+        Scale::Even => 1.0 / x,
+    };
     std::array::from_fn(|i| {
         std::array::from_fn(|j| match i.abs_diff(j) {
             0 => 2.0 * growth,

@@ -2,13 +2,13 @@ use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
 use crate::error::Error;
 use crate::visibility::Filter;
-use glam::{DMat4, DVec2, DVec3, Mat4, Vec4Swizzles};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4Swizzles};
 use std::ops::Range;
 
 /// The result of planning: which shadow maps to render and how to look them up.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// World position of local space's origin, metres: the viewer's position.
+    /// World position of local space's origin, metres: the camera's eye.
     pub origin: DVec3,
     /// The maps, light by light. Their number depends on the technique and on the number and kinds
     /// of the lights alone (a [wide](crate::SpotLight::is_wide) spot light is a kind of its own),
@@ -20,9 +20,13 @@ pub struct Plan {
     /// casters are drawn; whether it needs the depths of distant casters decides where depths
     /// begin.
     pub filter: Filter,
-    /// The dot product of this vector with a local point is the width of a pixel of the viewer's
-    /// image at that point, in metres.
-    pub pixel_gradient: DVec3,
+    /// The dot product of this vector with a homogeneous local point is the width of a pixel of the
+    /// viewer's image at that point, in metres.
+    pub pixel_gradient: DVec4,
+    /// The viewer's position as a homogeneous local point: (0, 0, 0, 1), or in orthographic views a
+    /// point at infinity, whose fourth coordinate is 0. The line of sight at a local point p runs
+    /// along p `viewer.w` − `viewer.xyz`.
+    pub viewer: DVec4,
 }
 
 /// The part of a [`Plan`] that belongs to one light.
@@ -101,7 +105,7 @@ impl Plan {
         world_position: DVec3,
         world_normal: DVec3,
     ) -> Option<Receiver> {
-        self.maps.get(map)?.receiver(world_position, world_normal, self.pixel_gradient)
+        self.maps.get(map)?.receiver(world_position, world_normal, self)
     }
 
     /// Indices of the maps that serve a world point under a light, each with its share of the
@@ -432,13 +436,12 @@ impl ShadowMap {
         Some(Beam { origin: near + self.origin, direction, reach_back })
     }
 
-    /// The receiver of [`Plan::receiver`], with the plan's
-    /// [`pixel_gradient`](Plan::pixel_gradient).
+    /// The receiver of [`Plan::receiver`].
     fn receiver(
         &self,
         world_position: DVec3,
         world_normal: DVec3,
-        pixel_gradient: DVec3,
+        plan: &Plan,
     ) -> Option<Receiver> {
         let local = world_position - self.origin;
         let here = (!self.is_empty()).then(|| Local::at(self, local))??;
@@ -462,12 +465,13 @@ impl ShadowMap {
             pixel_metric: {
                 // A step across the line of sight is continued along that line until it meets the
                 // surface's tangent plane.
-                let view = local.normalize_or_zero();
+                let view = local * plan.viewer.w - plan.viewer.truncate();
+                let view = view.normalize_or_zero();
                 let slant = world_normal.dot(view);
                 let slant = slant.signum() * slant.abs().max(LEAST_SLANT);
                 let on_plane =
                     |gradient: DVec3| gradient - world_normal * (gradient.dot(view) / slant);
-                let pixel_metres = pixel_gradient.dot(local).max(0.0);
+                let pixel_metres = plan.pixel_gradient.dot(local.extend(1.0)).max(0.0);
                 let across = |gradient| {
                     let gradient = on_plane(gradient);
                     (gradient - view * gradient.dot(view)) * pixel_metres

@@ -207,7 +207,8 @@ impl Planner {
         let keeps = view.is_some() && last_view == view;
         if !keeps {
             self.plan.origin = camera.eye();
-            self.plan.pixel_gradient = camera.forward() * camera.pixel_width_per_depth();
+            self.plan.pixel_gradient = camera.pixel_gradient();
+            self.plan.viewer = camera.viewer();
             self.plan.filter = technique.filter;
             self.last.lights.clear();
             self.focus(camera, bounds);
@@ -334,14 +335,21 @@ impl Planner {
             lit.set_clipped(view, pyramid);
         }
         let with_near = technique.partition.faces == Faces::SidesAndNear;
-        let faces = partition::LitFaces::new(camera, projector, with_near);
+        // All pixels of an orthographic view have the same width, so its faces need no maps of their
+        // own. The first one serves the whole view.
+        let faces = (!camera.is_orthographic())
+            .then(|| partition::LitFaces::new(camera, projector, with_near));
         let faces_with_maps = match technique.filter.has_maps() {
             true => technique.partition.face_list(),
             false => &[],
         };
-        for &face in faces_with_maps {
+        for (index, &face) in faces_with_maps.iter().enumerate() {
             self.cell.clear();
-            let has_part = face.is_none_or(|face| faces.cell(face, &mut self.cell));
+            let has_part = match (&faces, face) {
+                (Some(faces), Some(face)) => faces.cell(face, &mut self.cell),
+                (Some(_), None) => true,
+                (None, _) => index == 0,
+            };
             let Bodies { view, lit, face: body } = &mut self.bodies;
             let lit = if is_pyramid { &*lit } else { &*view };
             if has_part {
@@ -350,7 +358,8 @@ impl Planner {
                 body.clear();
             }
             self.cell.extend_from_slice(&self.pyramid);
-            let along = face.and_then(|f| faces.side(f)).map_or(Along::View, Along::Side);
+            let side = faces.zip(face).and_then(|(faces, face)| faces.side(face));
+            let along = side.map_or(Along::View, Along::Side);
             self.draft_slices(Part { face, ..part }, &along, request);
         }
     }

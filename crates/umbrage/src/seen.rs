@@ -2,8 +2,9 @@
 //!
 //! Lauritzen, Salvi and Lefohn 2010 ("Sample distribution shadow maps") fit maps to the bounds of
 //! the samples in the depth buffer. Here the samples of each tile of the picture lie between two
-//! parallel planes of inverse depth. A plane in space is also a plane over the picture when its
-//! inverse depth is plotted, so a floor, a wall or a roof takes no more room than it has.
+//! parallel planes of nearness: of inverse depth, or in orthographic views of depth with a minus
+//! sign. A plane in space is also a plane over the picture when its nearness is plotted, so a floor, a
+//! wall or a roof takes no more room than it has.
 
 use crate::bounds::Aabb;
 use crate::camera::Camera;
@@ -16,24 +17,24 @@ mod motion;
 #[cfg(test)]
 mod tests;
 
-/// What a tile of the picture shows: all its receivers lie between two parallel planes of inverse
-/// depth.
+/// What a tile of the picture shows: all its receivers lie between two parallel planes of nearness.
 ///
-/// At a pixel position p, in pixels as for [`Camera::ray`], 1/depth is at least `inverse[0] +
-/// slope · (p − middle)` and at most `inverse[1] + slope · (p − middle)`, where `middle` is the
-/// middle of `pixels`.
+/// At a pixel position p, in pixels as for [`Camera::ray`], the nearness is at least `nearness[0] +
+/// slope · (p − middle)` and at most `nearness[1] + slope · (p − middle)`, where `middle` is the
+/// middle of `pixels`. Nearness is 1/depth, 1/m. For orthographic cameras it is −depth, m, and
+/// units are metres where they are 1/m below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenTile {
     /// Left, upper, right and lower edge of the part of the picture that holds the receivers,
     /// pixels.
     pub pixels: [f64; 4],
-    /// Change of the inverse depth to the right and downwards, 1/m per pixel.
+    /// Change of nearness to the right and downwards, 1/m per pixel.
     pub slope: DVec2,
-    /// Least and greatest inverse depth in the middle, 1/m.
-    pub inverse: [f64; 2],
+    /// Least and greatest nearness in the middle, 1/m.
+    pub nearness: [f64; 2],
     /// The largest change of slope from pixel to pixel, along rows and columns: |w₋ − 2w + w₊|,
-    /// where w is the inverse depth, and 0 in the sky; 1/m. Within a plane it is 0, and at a
-    /// silhouette it is the jump in inverse depth, which tells how much may appear there when the
+    /// where w is the nearness, in the sky that of what is infinitely far; 1/m. Within a plane it is
+    /// 0, and at a silhouette it is the jump in nearness, which tells how much may appear there when the
     /// camera moves.
     pub jump: f64,
 }
@@ -57,7 +58,9 @@ pub struct SeenTile {
 /// [`LEAST_GAP`](Self::LEAST_GAP) pixels are not counted.
 ///
 /// Where the camera has moved along the view direction by more than half the distance of the
-/// nearest surface seen, the boxes alone serve the frame.
+/// nearest surface seen, the boxes alone serve the frame. So they do where an orthographic camera has
+/// turned, or its near plane has come to what it saw. In any other motion it uncovers nothing but at
+/// the edges of the picture.
 ///
 /// # What it costs
 /// Nothing where the camera stands still. In motion, tiles with silhouettes reach back to the
@@ -104,23 +107,24 @@ impl SeenTiles {
     /// pixel's centre, metres; infinite in the sky.
     ///
     /// # Errors
-    /// If a depth is not positive.
+    /// If a depth is not a number, or of a perspective camera not positive.
     pub fn of_depths(camera: &Camera, depth: impl Fn(u32, u32) -> f64) -> Result<Self, Error> {
         let mut seen = Self::new(camera);
         let [width, height] = camera.image();
         for y in 0..height {
             for x in 0..width {
                 let depth = depth(x, y);
-                check(depth > 0.0, "seen.depth", || {
-                    format!("must be positive, is {depth} at pixel {x}, {y}")
+                let least = if camera.is_orthographic() { f64::NEG_INFINITY } else { 0.0 };
+                check(depth > least, "seen.depth", || {
+                    format!("must be a number above {least}, is {depth} at pixel {x}, {y}")
                 })?;
             }
         }
-        let farthest = camera.far() * BEYOND;
+        let farthest = nearness(camera, beyond(camera, BEYOND));
         let reduction = Reduction {
             image: camera.image(),
-            inverse: |x, y| depth(x, y).recip(),
-            is_receiver: |inverse| inverse * farthest >= 1.0,
+            nearness: |x, y| nearness(camera, depth(x, y)),
+            is_receiver: |nearness| nearness >= farthest,
         };
         for (index, tile) in seen.tiles.iter_mut().enumerate() {
             *tile = reduction.tile(Self::tile_pixels(camera.image(), index));
@@ -131,7 +135,7 @@ impl SeenTiles {
     /// Replaces the tiles by those that `tile` returns, row by row from the top; `None` where only
     /// the sky shows. The buffer is kept.
     ///
-    /// Receivers a little beyond the camera's far distance, up to [`BEYOND`](Self::BEYOND) times,
+    /// Receivers a little beyond the camera's far distance, up to [`farthest`](Self::farthest),
     /// should be among them: they may come nearer when the camera turns.
     ///
     /// # Errors
@@ -156,8 +160,14 @@ impl SeenTiles {
         Ok(())
     }
 
-    /// Receivers are counted up to this many times the camera's far distance.
+    /// Receivers are counted up to this many times the camera's far distance, or an orthographic
+    /// camera's range of depths.
     pub const BEYOND: f64 = BEYOND;
+
+    /// The depth up to which receivers of a camera are counted, metres.
+    pub fn farthest(camera: &Camera) -> f64 {
+        beyond(camera, BEYOND)
+    }
 
     /// The camera that saw the tiles.
     pub fn camera(&self) -> &Camera {
@@ -178,7 +188,32 @@ impl SeenTiles {
 
 const BEYOND: f64 = 2.0;
 
-/// How far leaning planes may leave the points' range of inverse depths, as a share of the range.
+/// A depth that is so many times a camera's far distance, or an orthographic camera's range of
+/// depths.
+fn beyond(camera: &Camera, times: f64) -> f64 {
+    if camera.is_orthographic() {
+        camera.near() + (camera.far() - camera.near()) * times
+    } else {
+        camera.far() * times
+    }
+}
+
+/// The nearness of a depth, which in all planes is a linear function over the picture: 1/depth, or in
+/// orthographic views −depth, and then not infinite.
+fn nearness(camera: &Camera, depth: f64) -> f64 {
+    if camera.is_orthographic() { -depth.clamp(-FARTHEST, FARTHEST) } else { depth.recip() }
+}
+
+/// The depth of a nearness.
+fn depth(camera: &Camera, nearness: f64) -> f64 {
+    if camera.is_orthographic() { -nearness } else { nearness.recip() }
+}
+
+/// What is farther than this in an orthographic view counts as at this depth, metres. It is farther
+/// than any camera's receivers.
+const FARTHEST: f64 = 1e13;
+
+/// How far leaning planes may leave the points' range of nearness, as a share of the range.
 /// Half a pixel beyond the outermost pixel centres needs a little.
 const MOST_OVERSHOOT: f64 = 0.05;
 
@@ -194,10 +229,10 @@ fn tile_pixels([width, height]: [u32; 2], [across, down]: [u32; 2], index: usize
     ]
 }
 
-/// The tiles of a picture whose inverse depths are known in each pixel.
+/// The tiles of a picture whose nearness is known in each pixel.
 struct Reduction<I, R> {
     image: [u32; 2],
-    inverse: I,
+    nearness: I,
     is_receiver: R,
 }
 
@@ -214,10 +249,10 @@ impl<I: Fn(u32, u32) -> f64, R: Fn(f64) -> bool> Reduction<I, R> {
         let receivers = || {
             let pixels = rows.clone().flat_map(|y| columns.clone().map(move |x| (x, y)));
             pixels.filter_map(|(x, y)| {
-                let inverse = (self.inverse)(x, y);
-                (self.is_receiver)(inverse).then(|| Point {
+                let nearness = (self.nearness)(x, y);
+                (self.is_receiver)(nearness).then(|| Point {
                     at: DVec2::new(f64::from(x), f64::from(y)) + 0.5,
-                    inverse: [inverse; 2],
+                    nearness: [nearness; 2],
                 })
             })
         };
@@ -238,7 +273,7 @@ impl<I: Fn(u32, u32) -> f64, R: Fn(f64) -> bool> Reduction<I, R> {
 
     fn jump(&self, [left, top, right, bottom]: [u32; 4]) -> f64 {
         let [width, height] = self.image;
-        let w = &self.inverse;
+        let w = &self.nearness;
         let mut jump = 0.0f64;
         for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
             if x > 0 && x + 1 < width {
@@ -252,30 +287,30 @@ impl<I: Fn(u32, u32) -> f64, R: Fn(f64) -> bool> Reduction<I, R> {
     }
 }
 
-/// A position in the picture, pixels, and the range of inverse depths there.
+/// A position in the picture, pixels, and the range of nearness there.
 #[derive(Clone, Copy)]
 struct Point {
     at: DVec2,
-    inverse: [f64; 2],
+    nearness: [f64; 2],
 }
 
 impl SeenTile {
     /// A tile around the points, between planes that lean as the points do on the whole, or half as
     /// much, or that face the viewer.
     fn around<P: Iterator<Item = Point>>(pixels: [f64; 4], points: impl Fn() -> P) -> Self {
-        let flat = Self { pixels, slope: DVec2::ZERO, inverse: [0.0; 2], jump: 0.0 };
+        let flat = Self { pixels, slope: DVec2::ZERO, nearness: [0.0; 2], jump: 0.0 };
         let middle = flat.middle();
         let between = |slope: DVec2| {
             let above = |p: &Point| slope.dot(p.at - middle);
-            let (lo, _) = range(points().map(|p| p.inverse[0] - above(&p)));
-            let (_, hi) = range(points().map(|p| p.inverse[1] - above(&p)));
-            Self { slope, inverse: [lo, hi], ..flat }
+            let (lo, _) = range(points().map(|p| p.nearness[0] - above(&p)));
+            let (_, hi) = range(points().map(|p| p.nearness[1] - above(&p)));
+            Self { slope, nearness: [lo, hi], ..flat }
         };
         let slope = least_squares(middle, points());
         let flat = between(DVec2::ZERO);
         // Where leaning planes leave the range of the points by much, they do not describe them,
         // and a corner close to the viewer would cost more texels than the planes save.
-        let [lo, hi] = flat.inverse;
+        let [lo, hi] = flat.nearness;
         let slack = MOST_OVERSHOOT * flat.thickness();
         [slope, slope / 2.0]
             .map(between)
@@ -308,32 +343,32 @@ impl SeenTile {
     }
 
     fn thickness(&self) -> f64 {
-        self.inverse[1] - self.inverse[0]
+        self.nearness[1] - self.nearness[0]
     }
 
-    /// Lower left, lower right, upper left and upper right corner, with the inverse depths there.
+    /// Lower left, lower right, upper left and upper right corner, with the nearness there.
     fn corners(&self) -> [Point; 4] {
         let [left, top, right, bottom] = self.pixels;
         let middle = self.middle();
         [[left, bottom], [right, bottom], [left, top], [right, top]].map(|at| {
             let at = DVec2::from(at);
-            Point { at, inverse: self.inverse.map(|w| w + self.slope.dot(at - middle)) }
+            Point { at, nearness: self.nearness.map(|w| w + self.slope.dot(at - middle)) }
         })
     }
 
-    /// The least and the greatest inverse depth, 1/m.
+    /// The least and the greatest nearness, 1/m.
     fn ends(&self) -> [f64; 2] {
         let rise = (self.slope * self.size() / 2.0).abs().element_sum();
-        [self.inverse[0] - rise, self.inverse[1] + rise]
+        [self.nearness[0] - rise, self.nearness[1] + rise]
     }
 
-    /// The greatest inverse depth, 1/m.
+    /// The greatest nearness, 1/m.
     fn nearest(&self) -> f64 {
         self.ends()[1]
     }
 
     fn check(&self) -> Result<(), Error> {
-        let Self { pixels: [left, top, right, bottom], slope, inverse: [lo, hi], jump } = *self;
+        let Self { pixels: [left, top, right, bottom], slope, nearness: [lo, hi], jump } = *self;
         let is_finite = [left, top, right, bottom, lo, hi, jump].iter().all(|n| n.is_finite());
         let is_in_order = left <= right && top <= bottom && lo <= hi && jump >= 0.0;
         check(is_finite && slope.is_finite() && is_in_order, "seen.tiles", || {
@@ -349,13 +384,13 @@ fn least_squares(middle: DVec2, points: impl Iterator<Item = Point>) -> DVec2 {
     let (mut squares, mut product, mut moments) = (DVec2::ZERO, 0.0, DVec2::ZERO);
     for p in points {
         let at = p.at - middle;
-        let inverse = p.inverse[0].midpoint(p.inverse[1]);
+        let nearness = p.nearness[0].midpoint(p.nearness[1]);
         count += 1.0;
         at_sum += at;
-        sum += inverse;
+        sum += nearness;
         squares += at * at;
         product += at.x * at.y;
-        moments += at * inverse;
+        moments += at * nearness;
     }
     // Covariances, times the number of points.
     let squares = squares - at_sum * at_sum / count;

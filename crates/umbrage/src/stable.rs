@@ -6,7 +6,7 @@ use crate::matrices::{DepthRange, MARGIN_TEXELS, matrices};
 use crate::plan::ShadowMap;
 use crate::slab::along_axis;
 use crate::warp::{LightSpace, Shape};
-use glam::{DMat3, DVec3, DVec4};
+use glam::{DMat3, DVec2, DVec3, DVec4};
 
 /// The placement of a stable map. Its texels keep their positions and their size in the world,
 /// whatever the camera does.
@@ -31,15 +31,19 @@ impl Stable {
     /// pyramid of light, all that the light reaches.
     pub(crate) fn around(projector: &Projector, camera: &Camera, [near, far]: [f64; 2]) -> Self {
         let space = LightSpace::fixed(projector, camera);
-        let pixel = camera.pixel_width_per_depth();
         if let Projector::Pyramid { slope, near, range, .. } = *projector {
             let region = Region::Pyramid { slope, inverse_depths: [range, near].map(f64::recip) };
-            // The error of a receiver that the camera sees from the same distance as the lamp.
-            return Self { space, region, unit_error: 2.0 * slope / pixel };
+            // The error of a receiver that the camera sees from the same distance as the lamp. An
+            // orthographic view has no such distance; the picture's height replaces it.
+            return Self {
+                space,
+                region,
+                unit_error: 2.0 * slope / camera.pixel_width_per_scale(),
+            };
         }
         let (center, radius) = bounding_sphere(camera, [near, far]);
         let region = Region::Sphere { center: camera.eye() + center, radius };
-        Self { space, region, unit_error: 2.0 * radius / (near * pixel) }
+        Self { space, region, unit_error: 2.0 * radius / camera.pixel_width(near) }
     }
 
     /// The map's largest errors in s and t with one texel, pixels per texel, whatever receivers
@@ -110,14 +114,19 @@ fn texels(radius: f64, resolution: [u32; 2]) -> [f64; 2] {
 /// and radius, metres. It is computed in the view's own axes, so that the radius is the same to the
 /// last digit wherever the camera is and however it is turned.
 pub(crate) fn bounding_sphere(camera: &Camera, [near, far]: [f64; 2]) -> (DVec3, f64) {
-    let corners = camera.corner_slopes().map(|slope| slope.extend(1.0));
+    let slopes = camera.corner_slopes();
+    let middle = slopes.iter().sum::<DVec2>() / 4.0;
     // The centre lies on the frustum's axis, where near and far corners are equally distant, or at
     // the far plane if that is nearer.
-    let axis = corners.iter().sum::<DVec3>() / 4.0;
-    let depth =
-        ((near + far) * corners[0].length_squared() / (2.0 * corners[0].dot(axis))).min(far);
-    let center = axis * depth;
-    let distances = corners.iter().flat_map(|&c| [near, far].map(|d| (c * d).distance(center)));
+    let at = |slope: DVec2, depth: f64| (slope * camera.scale_at(depth)).extend(depth);
+    let depth = if camera.is_orthographic() {
+        near.midpoint(far)
+    } else {
+        let [corner, axis] = [slopes[0], middle].map(|slope| slope.extend(1.0));
+        ((near + far) * corner.length_squared() / (2.0 * corner.dot(axis))).min(far)
+    };
+    let center = at(middle, depth);
+    let distances = slopes.iter().flat_map(|&s| [near, far].map(|d| at(s, d).distance(center)));
     let radius = distances.fold(0.0, f64::max);
     (camera.right() * center.x + camera.up() * center.y + camera.forward() * center.z, radius)
 }

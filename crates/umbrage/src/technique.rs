@@ -112,6 +112,12 @@ impl Cover {
 /// differ only in λ, the distance from the centre of projection to the warp's near plane. All but
 /// `Lambda` turn smoothly into `Uniform` as the view direction approaches the light direction.
 ///
+/// In orthographic views a pixel has the same width at every depth. `Psm`, `Lispsm`, `Tsm` and `Log`,
+/// which undo the viewer's perspective, are then `Uniform`; the λ of their rules tends to infinity as
+/// a perspective view recedes. Under parallel light no warp needs fewer texels than none, and
+/// `Adaptive` finds that. Under a lamp texels grow with the distance from the lamp, and it may still
+/// warp. `Lambda` does what it says.
+///
 /// Where the view runs exactly along the light, the view direction does not define a z axis. While
 /// the view sweeps past the light direction, every map therefore makes half a turn, `Uniform`
 /// included, within about the angle by which the view misses the light direction.
@@ -152,6 +158,16 @@ pub enum Warp {
     /// A perspective with this λ > 0 in light-space metres; infinite λ is no warp. (Under spot
     /// lights λ counts in units of the light's image plane at distance 1.)
     Lambda(f64),
+}
+
+impl Warp {
+    /// The warp for views without a perspective, in which all pixels have the same width.
+    pub(crate) fn without_perspective(self) -> Self {
+        match self {
+            Self::Psm | Self::Lispsm | Self::Tsm { .. } | Self::Log => Self::Uniform,
+            Self::Uniform | Self::Adaptive(_) | Self::Lambda(_) => self,
+        }
+    }
 }
 
 /// The quantity that [`Warp::Adaptive`] minimises.
@@ -197,7 +213,8 @@ impl Default for Partition {
 }
 
 /// Where slices along the view meet. n and f are the view distances of the nearest and the farthest
-/// receiver seen; for [`Cover::Stable`] they are the camera's near and far distance.
+/// receiver seen; for [`Cover::Stable`] they are the camera's near and far distance. In orthographic
+/// views slices of equal length have equal errors, so `SelfSimilar` and `Practical` make these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Splits {
@@ -216,6 +233,9 @@ pub enum Splits {
 /// Whether the faces of the view frustum have maps of their own (Lloyd et al. 2006, §5.1). The
 /// faces used are the frustum's front faces, as seen from the light, if the light comes from behind
 /// the viewer, and its back faces otherwise.
+///
+/// In orthographic views all faces would need the same map. The first face serves the whole view
+/// there, and the maps of the others are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Faces {
     /// No: each map serves the frustum as a whole.

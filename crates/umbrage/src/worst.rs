@@ -1,7 +1,7 @@
 //! The largest errors of a map over a body, to a known tolerance.
 //!
-//! Let A be the footprint (metres per texel), w the projection's fourth coordinate and z the view
-//! depth. Then A = w·B. Under parallel light B is affine in the point; under a spot light B = (r
+//! Let A be the footprint (metres per texel), w the projection's fourth coordinate and z the scale
+//! of the view, which is its depth, or constant in orthographic views. Then A = w·B. Under parallel light B is affine in the point; under a spot light B = (r
 //! × K)/|r|, where r is the vector from the light to the point and r × K is affine. On a simplex,
 //! therefore,
 //!
@@ -41,7 +41,7 @@ const MAX_UNBOUNDED_SPLITS: usize = 20 * MAX_SPLITS;
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     p: DVec3,
-    /// Errors in s, in t and in the worst direction, metres per texel over view depth.
+    /// Errors in s, in t and in the worst direction, metres per texel over the scale of the view.
     errors: [f64; 3],
     /// Distance from the light; 1 for parallel light.
     r: f64,
@@ -82,7 +82,7 @@ struct Point {
     w: f64,
     z: f64,
     w_over_z: f64,
-    /// Error in the worst direction, metres per texel over view depth.
+    /// Error in the worst direction, metres per texel over the scale of the view.
     error: f64,
 }
 
@@ -145,7 +145,7 @@ fn search(probe: &Probe<'_>, body: &Body, buffers: &mut Buffers) -> [f64; 3] {
     }
     // Simplices that are still open count with their bounds.
     let bounds = search.open.iter().fold(search.settled, |bounds, s| larger(bounds, s.value.bound));
-    let pixel = probe.camera.pixel_width_per_depth();
+    let pixel = probe.camera.pixel_width_per_scale();
     larger(search.best, bounds).map(|e| e / pixel)
 }
 
@@ -169,13 +169,13 @@ pub(crate) fn worst_of_shape(
     points.clear();
     points.extend(seen.iter().map(|p| {
         let w = shape.w(p.xz.y);
-        let w_over_z = w / p.depth;
+        let w_over_z = w / p.scale;
         most = [most[0].max(w_over_z), most[1].max(w_over_z * w)];
-        Point { off_axis: shape.off_axis(p.xz.x), w, z: p.depth, w_over_z, error: 0.0 }
+        Point { off_axis: shape.off_axis(p.xz.x), w, z: p.scale, w_over_z, error: 0.0 }
     }));
     let norm = |w: f64, off_axis: f64| shape.texel_over_w(w, off_axis, resolution).longest();
     let texel = shape.texel_over_w(1.0, 0.0, resolution);
-    let pixel = camera.pixel_width_per_depth();
+    let pixel = camera.pixel_width_per_scale();
     let [max_s, max_t] = [most[0] * texel.base / pixel, most[1] * texel.height / pixel];
     let error = |max: f64| MapError::new([max_s, max_t], max / pixel);
     if shape.is_even() {
@@ -324,7 +324,7 @@ impl Probe<'_> {
     fn corner(&self, p: DVec3) -> Option<Corner> {
         let local = Local::at(self.map, p)?;
         let footprint = local.footprint();
-        let z = self.camera.forward().dot(p);
+        let z = self.camera.scale_of(p);
         Some(Corner {
             p,
             errors: [footprint.base(), footprint.height(), footprint.longest()].map(|e| e / z),

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{WARPS, config, planner, technique};
+use common::{WARPS, config, detail, planner, technique};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use umbrage::ShadowMap;
@@ -28,7 +28,7 @@ proptest! {
         let (name, spread) = WARPS[pick];
         let camera = config.camera;
         // Differences of coordinates far from the origin lose all digits.
-        prop_assume!(camera.eye().length() < 1e3 * camera.near().max(0.1));
+        prop_assume!(camera.eye().length() < 1e3 * detail(&camera).max(0.1));
         let mut planner = planner();
         let plan = planner.plan(&camera, &[config.light], &config.bounds, &technique(spread)).unwrap();
         for p in config.seen_points(&numbers) {
@@ -91,7 +91,7 @@ proptest! {
         normal in common::direction(),
     ) {
         let (name, spread) = WARPS[pick];
-        prop_assume!(config.camera.eye().length() < 1e3 * config.camera.near().max(0.1));
+        prop_assume!(config.camera.eye().length() < 1e3 * detail(&config.camera).max(0.1));
         let mut planner = planner();
         let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique(spread)).unwrap();
         for p in config.seen_points(&[number]) {

@@ -270,7 +270,7 @@ fn misprints_in_the_papers_fail() {
     let printed = f64::from(IMAGE) / f64::from(RES[0]) * f * lambda / (lambda + f - n);
     assert_close(off(map.error.max_s, printed), n, 1e-6, "M_s as printed is n times too large");
     let printed = 2.0 * 7.0 * PHI.tan() / (n * f64::from(IMAGE));
-    let measured = 7.0 * wide.pixel_width_per_depth();
+    let measured = wide.pixel_width(7.0);
     assert_close(off(measured, printed), 1.0 / n, 1e-9, "w_i as printed is 1/n of a pixel's width");
 
     // Zhang et al., appendix: tan φ_w for θ > φ cuts off corners, and F_p is too large.

@@ -85,14 +85,15 @@ fn check_maxima(spreads: &[(&str, Spread)]) {
                 let map = &plan.maps[0];
                 prop_assert!(!map.is_empty());
                 let forward = config.camera.forward();
+                let width = |p: &glam::DVec3| config.camera.pixel_width(p.dot(forward));
                 let mut reached = [0f64; 3];
                 for (i, a) in corners.iter().enumerate() {
                     for b in &corners[..=i] {
                         for k in 0..=40 {
                             // The points are spread evenly in the image, so the share of b grows
-                            // with 1/z.
+                            // with 1/z in perspective views.
                             let k = f64::from(k) / 40.0;
-                            let (to_a, to_b) = ((1.0 - k) * b.dot(forward), k * a.dot(forward));
+                            let (to_a, to_b) = ((1.0 - k) * width(b), k * width(a));
                             let p = config.camera.eye() + a.lerp(*b, to_b / (to_a + to_b));
                             if let Some(e) = map.perspective_error(&config.camera, p) {
                                 for (r, e) in reached.iter_mut().zip([e.s, e.t, e.worst]) {

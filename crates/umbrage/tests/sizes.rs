@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    Config, STABLE, Spread, WARPS, camera, config, direction, partition, planner, possible,
-    technique,
+    Config, STABLE, Spread, WARPS, camera, config, detail, direction, partition, planner, possible,
+    reach, technique,
 };
 use glam::DVec3;
 use proptest::prelude::*;
@@ -222,7 +222,7 @@ proptest! {
         let light = |kind: u8, direction: DVec3| match kind {
             0 => Light::Directional { direction },
             1 => {
-                let (near, range) = (config.camera.near(), config.camera.far());
+                let (near, range) = (detail(&config.camera), 2.0 * reach(&config.camera));
                 let position = config.camera.eye() + direction * 0.3 * range;
                 Light::Point(PointLight { position, near, range })
             }

@@ -6,12 +6,14 @@
 
 mod common;
 
-use common::{Config, STABLE, Spread, WARPS, config, direction, planner, possible, technique};
+use common::{
+    Config, STABLE, Spread, WARPS, config, detail, direction, planner, possible, technique,
+};
 use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Face, Faces, Light, LookAt, Objective, Partition, Plan, ShadowMap, Size,
-    Splits, Technique, Warp,
+    Aabb, Bounds, Camera, Face, Faces, Light, LookAt, Objective, Orthographic, Partition, Plan,
+    ShadowMap, Size, Splits, Technique, Warp,
 };
 
 struct Frame {
@@ -220,7 +222,7 @@ const SMALL: f64 = 1e-6;
 /// The same view and light after a motion of this size: of the eye, of the view, or of the light.
 fn moved(config: &Config, which: usize, step: DVec3, axis: DVec3) -> (Camera, Light) {
     let turn = |d: DVec3| DQuat::from_axis_angle(axis, SMALL) * d;
-    let step = step * SMALL * config.camera.near();
+    let step = step * SMALL * detail(&config.camera);
     let (mut eye, mut forward) = (config.camera.eye(), config.camera.forward());
     let (mut up, mut light) = (config.camera.up(), config.light);
     match which {
@@ -235,15 +237,16 @@ fn moved(config: &Config, which: usize, step: DVec3, axis: DVec3) -> (Camera, Li
             Light::Point(point) => point.position += step,
         },
     }
-    let camera = Camera::look_at(LookAt {
-        eye,
-        target: eye + forward,
-        up,
-        fov_y_rad: 2.0 * config.camera.tan_half_fov_y().atan(),
-        near: config.camera.near(),
-        far: config.camera.far(),
-        image: config.camera.image(),
-    });
+    let (target, near, far) = (eye + forward, config.camera.near(), config.camera.far());
+    let image = config.camera.image();
+    // Of a perspective view at a distance of one metre.
+    let height = config.camera.pixel_width(1.0) * f64::from(image[1]);
+    let camera = if config.camera.is_orthographic() {
+        Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
+    } else {
+        let fov_y_rad = 2.0 * (height / 2.0).atan();
+        Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
+    };
     (camera.unwrap(), light)
 }
 

@@ -46,7 +46,7 @@ pub(crate) struct Compare {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 VIEWS is a JSON list of objects. Each needs `name` and `scene`; what `compare` takes as options may
-follow, with the same defaults: `eye`, `target`, `up` (three numbers), `fov`, `near`, `far`, `size` (two),
+follow, with the same defaults: `eye`, `target`, `up` (three numbers), `fov`, `ortho`, `near`, `far`, `size` (two),
 `camera`, `sun` (three) and `light`. For example
   [{\"name\": \"noon\", \"scene\": \"town\", \"sun\": [0.1, -1, 0.2]},
    {\"name\": \"gate\", \"scene\": \"city/level.glb\", \"eye\": [0, 2, 9], \"target\": [0, 1, 0], \"far\": 80}]

@@ -37,6 +37,12 @@ pub(crate) struct ViewArgs {
     /// Vertical field of view, degrees.
     #[arg(long, value_name = "DEG", value_parser = values::field_of_view, allow_hyphen_values = true)]
     pub(crate) fov: Option<f64>,
+    /// Orthographic view: the height of what the picture shows, metres.
+    #[arg(
+        long, value_name = "HEIGHT", value_parser = values::distance, allow_hyphen_values = true,
+        conflicts_with = "fov"
+    )]
+    pub(crate) ortho: Option<f64>,
     /// Distance at which the view begins, metres.
     #[arg(long, value_name = "N", value_parser = values::distance, allow_hyphen_values = true)]
     pub(crate) near: Option<f64>,
@@ -81,8 +87,18 @@ pub(crate) struct LightsArgs {
 impl ViewArgs {
     /// The view that is asked for.
     pub(crate) fn options(&self) -> ViewOptions {
-        let Self { eye, target, up, fov, near, far, size, ref camera } = *self;
-        ViewOptions { eye, target, up, fov_deg: fov, near, far, size, camera: camera.clone() }
+        let Self { eye, target, up, fov, ortho, near, far, size, ref camera } = *self;
+        ViewOptions {
+            eye,
+            target,
+            up,
+            fov_deg: fov,
+            ortho,
+            near,
+            far,
+            size,
+            camera: camera.clone(),
+        }
     }
 }
 

@@ -26,7 +26,7 @@ pub fn flicker(
     techniques: &[NamedTechnique],
     progress: &dyn Progress,
 ) -> Result<Vec<Option<f64>>, Error> {
-    let MovingView { scene, look_at, samples, .. } = *moving;
+    let MovingView { scene, chosen_view, samples, .. } = *moving;
     let frames = Frame::all(motion, frames, moving, samples, techniques)?;
     let mut change = vec![0f64; techniques.len()];
     let mut compared = 0u64;
@@ -49,7 +49,7 @@ pub fn flicker(
                 *change += is.iter().zip(was).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
             }
         }
-        progress.advance(u64::from(look_at.image[1]));
+        progress.advance(u64::from(chosen_view.camera.image()[1]));
         before = Some(&frame.view);
         std::mem::swap(&mut now, &mut last);
     }

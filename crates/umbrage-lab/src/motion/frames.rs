@@ -5,8 +5,9 @@ use crate::executor::{Executor, RenderScene};
 use crate::planning;
 use crate::receivers::Receivers;
 use crate::technique::NamedTechnique;
+use crate::view::ChosenView;
 use glam::{DQuat, DVec3};
-use umbrage::{Camera, Light, LookAt, Plan};
+use umbrage::{Camera, Light, Plan};
 use umbrage_trace::View;
 
 /// A motion of the viewer or the light, in steps as small as between the frames of a film.
@@ -32,7 +33,7 @@ pub struct MovingView<'a> {
     /// The scene's receivers, which tell the planner where shadows fall.
     pub receivers: &'a Receivers,
     /// The view of the first frame.
-    pub look_at: LookAt,
+    pub chosen_view: &'a ChosenView,
     /// The light of the first frame.
     pub light: Light,
     /// Rays along each side of a pixel, 1 to 64.
@@ -54,14 +55,15 @@ impl Motion {
     ///
     /// # Errors
     /// An error if a frame's view is not one that a camera can have, or if the light cannot turn.
-    pub fn check(self, frames: u32, look_at: LookAt, light: Light) -> Result<(), Error> {
-        (0..frames).try_for_each(|i| self.frame(look_at, light, i).map(drop))
+    pub fn check(self, frames: u32, first: &ChosenView, light: Light) -> Result<(), Error> {
+        (0..frames).try_for_each(|i| self.frame(first, light, i).map(drop))
     }
 
-    /// Returns the view and the light of a frame. The first frame has `look_at` and `light`.
-    fn frame(self, look_at: LookAt, light: Light, index: u32) -> Result<(Camera, Light), Error> {
+    /// Returns the view and the light of a frame. The first frame has `first` and `light`.
+    fn frame(self, first: &ChosenView, light: Light, index: u32) -> Result<(Camera, Light), Error> {
         let index = f64::from(index);
-        let mut frame = (look_at, light);
+        let look_at = &first.view;
+        let mut frame = (look_at.clone(), light);
         match self {
             Self::Dolly => {
                 let step = (look_at.target - look_at.eye) * (0.01 * index);
@@ -87,7 +89,7 @@ impl Motion {
                 }
             }
         }
-        let camera = Camera::look_at(frame.0).about(Field::Motion)?;
+        let camera = frame.0.camera(first.camera.image()).about(Field::Motion)?;
         Ok((camera, frame.1))
     }
 }
@@ -107,12 +109,12 @@ impl<'a> Frame<'a> {
         samples: u32,
         techniques: &[NamedTechnique],
     ) -> Result<Vec<Self>, Error> {
-        let MovingView { scene, receivers, look_at, light, .. } = *moving;
+        let MovingView { scene, receivers, chosen_view, light, .. } = *moving;
         // What was seen in the frame before serves a frame, as where depths are read back from a
         // GPU.
         let mut before = None;
         let frame = |i| {
-            let (camera, light) = motion.frame(look_at, light, i)?;
+            let (camera, light) = motion.frame(chosen_view, light, i)?;
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
             let seen = scene.seen(receivers, &camera)?;
             let bounds = receivers.bounds(before.as_ref().or(seen.as_ref()));

@@ -39,10 +39,10 @@ pub fn noise(
     techniques: &[NamedTechnique],
     progress: &dyn Progress,
 ) -> Result<Vec<Noise>, Error> {
-    let MovingView { scene, look_at, .. } = *moving;
+    let MovingView { scene, chosen_view, .. } = *moving;
     let all = Frame::all(motion, frames, moving, TRUTH_SAMPLES, techniques)?;
     let mut executors = executors(scene, techniques)?;
-    let count = look_at.image.map(|n| n as usize).iter().product();
+    let count = chosen_view.camera.image().map(|n| n as usize).iter().product();
     let mut trails: Vec<Trail> = techniques.iter().map(|_| Trail::new(count)).collect();
     for (i, Frame { view, plans }) in all.iter().enumerate() {
         progress.stage(&format!("noise: frame {} of {}", i + 1, all.len()));

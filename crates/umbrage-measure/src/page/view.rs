@@ -281,7 +281,13 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
         ("Camera", format!("{}at {} m", named(&view.name), vector(view.eye))),
         ("looks at", format!("{} m", vector(view.target))),
         ("up", vector(view.up)),
-        ("field of view", format!("{}° vertically", plain(view.fov))),
+        match (view.fov, view.ortho) {
+            (_, Some(height)) => ("shows", format!("{} m vertically", significant(height))),
+            (fov, None) => (
+                "field of view",
+                fov.map_or_else(|| "unknown".to_owned(), |f| format!("{}° vertically", plain(f))),
+            ),
+        },
         ("range", format!("{} to {} m", significant(view.near), significant(view.far))),
     ];
     match &report.light {

@@ -4,8 +4,8 @@ use crate::{Args, Failure};
 use glam::DVec3;
 use serde::Deserialize;
 use std::path::PathBuf;
-use umbrage::{Light, LookAt};
-use umbrage_scene::Scene;
+use umbrage::{Camera, Light};
+use umbrage_scene::{Lens, Scene, SceneCamera};
 
 /// The scenes whose default views are measured: three built-in ones, and four third-party ones with
 /// a built-in one in place of each that is missing.
@@ -45,7 +45,7 @@ pub(crate) struct Listed {
 pub(crate) struct Case {
     pub(crate) name: String,
     pub(crate) scene: Scene,
-    look_at: LookAt,
+    view: SceneCamera,
     pub(crate) light: Light,
 }
 
@@ -86,32 +86,29 @@ impl Listed {
             let size = if size.is_empty() { None } else { Some(size.parse()?) };
             umbrage_scene::builtin(name, size)?
         };
-        let (name, look_at, light) = match view {
+        let (name, view, light) = match view {
             Some(view) => {
-                let look_at = LookAt {
+                let camera = SceneCamera {
+                    name: view.name.clone(),
                     eye: view.eye.into(),
                     target: view.target.into(),
                     up: DVec3::Y,
-                    fov_y_rad: view.fov.to_radians(),
+                    lens: Lens::Perspective { fov_y_rad: view.fov.to_radians() },
                     near: view.near,
                     far: view.far,
-                    image: [1, 1],
                 };
-                (view.name, look_at, Light::Directional { direction: view.sun.into() })
+                (view.name, camera, Light::Directional { direction: view.sun.into() })
             }
-            None => {
-                let look_at = scene.default_view().look_at([1, 1]);
-                (scene.name.clone(), look_at, scene.default_light().light)
-            }
+            None => (scene.name.clone(), scene.default_view(), scene.default_light().light),
         };
-        Ok(Case { name, scene, look_at, light })
+        Ok(Case { name, scene, view, light })
     }
 }
 
 impl Case {
     /// The view, with a picture of this size, pixels.
-    pub(crate) fn look_at(&self, image: [u32; 2]) -> LookAt {
-        LookAt { image, ..self.look_at }
+    pub(crate) fn camera(&self, image: [u32; 2]) -> Result<Camera, umbrage::Error> {
+        self.view.camera(image)
     }
 
     /// Number of triangles, counted once for each instance.

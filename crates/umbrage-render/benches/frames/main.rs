@@ -132,7 +132,7 @@ impl<'a> Set<'a> {
             gpu,
             case,
             buffers: SceneBuffers::new(gpu, &case.scene, true)?,
-            camera: Camera::look_at(case.look_at(image))?,
+            camera: case.camera(image)?,
             all: case.scene.bounds(),
             boxes: umbrage::BoxTree::new(&Tracer::new(&case.scene)?.boxes(256))?,
             target: FrameTarget::new(gpu, image)?,

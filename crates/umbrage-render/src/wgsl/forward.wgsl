@@ -3,7 +3,9 @@
 
 struct View {
     clip_from_render: mat4x4f,
-    // The ray of unit depth through the point (x, y) of the target is ray + x ray_x + y ray_y.
+    // The line of sight through the point (x, y) of the target has the direction of unit depth ray +
+    // x ray_x + y ray_y. In orthographic views all directions are `ray`, and the line begins at x
+    // ray_x + y ray_y from where the first one begins.
     ray: vec3f,
     // Number of samples along each side of a pixel.
     grid: f32,
@@ -20,7 +22,7 @@ struct View {
     light_direction: vec3f,
     light_index: u32,
     light_position: vec3f,
-    padding: f32,
+    is_orthographic: u32,
     sun: vec4f,
     sky_light: vec4f,
     ground_light: vec4f,
@@ -201,9 +203,16 @@ fn radiance(s: Surface) -> vec3f {
     return s.color * (direct + ambient);
 }
 
+// The direction of the line of sight through a point of the target, of unit depth.
+fn line_of_sight(at: vec2f) -> vec3f {
+    if (view.is_orthographic != 0u) {
+        return view.ray;
+    }
+    return view.ray + at.x * view.ray_x + at.y * view.ray_y;
+}
+
 fn sky(target_position: vec2f) -> vec3f {
-    let ray = view.ray + target_position.x * view.ray_x + target_position.y * view.ray_y;
-    let direction = normalize(ray);
+    let direction = normalize(line_of_sight(target_position));
     let height = direction.y;
     var color: vec3f;
     if (height >= 0.0) {
@@ -255,7 +264,7 @@ fn sky_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
 }
 
 // Radiance and visibility, normal and depth. Visibility is -1 where the surface faces away from the
-// light. Depth is 0 in the sky.
+// light. Normal and depth are 0 in the sky.
 struct Picture {
     @location(0) radiance_visibility: vec4f,
     @location(1) normal_depth: vec4f,
@@ -301,11 +310,11 @@ fn texels(at: vec4f, s: Surface) -> vec4f {
     }
     let point = shadow_point(place.map, s.position);
     // How the surface point moves on its plane from pixel to pixel.
-    let ray = view.ray + at.x * view.ray_x + at.y * view.ray_y;
+    let ray = line_of_sight(at.xy);
     let across = dot(s.normal, ray);
-    let depth = dot(view.forward, s.position);
-    let step_x = depth * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));
-    let step_y = depth * view.grid * (view.ray_y - ray * (dot(s.normal, view.ray_y) / across));
+    let scale = select(dot(view.forward, s.position), 1.0, view.is_orthographic != 0u);
+    let step_x = scale * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));
+    let step_y = scale * view.grid * (view.ray_y - ray * (dot(s.normal, view.ray_y) / across));
     // Texels per pixel; then the larger singular value of the inverse.
     let column_x = vec2f(dot(point.grad_s, step_x), dot(point.grad_t, step_x));
     let column_y = vec2f(dot(point.grad_s, step_y), dot(point.grad_t, step_y));

@@ -1,5 +1,7 @@
 use super::mesh_builder::MeshBuilder;
-use crate::types::{Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId};
+use crate::types::{
+    self, Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId,
+};
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 use umbrage::{Light, PointLight, SpotLight};
 
@@ -82,7 +84,7 @@ impl Stage {
             eye,
             target,
             up: DVec3::Y,
-            fov_y_rad: lens.fov_y_deg.to_radians(),
+            lens: types::Lens::Perspective { fov_y_rad: lens.fov_y_deg.to_radians() },
             near: lens.near,
             far: lens.far,
         });

@@ -2,7 +2,7 @@
 
 use super::document::{Document, Notices};
 use crate::error::SceneError;
-use crate::types::{SceneCamera, SceneLight};
+use crate::types::{Lens, SceneCamera, SceneLight};
 use glam::{DAffine3, DVec3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::Type;
 use gltf::json::validation::Checked;
@@ -33,26 +33,41 @@ pub(super) fn load_camera(
 ) -> Result<Option<SceneCamera>, SceneError> {
     let place = format!("cameras[{}]", index.value());
     let json = document.get(index, &place)?;
-    let Some(perspective) = &json.perspective else {
-        notices.add(&place, "is not a perspective camera, left out");
-        return Ok(None);
-    };
     let m = world_from_node.matrix3;
     let (Some(forward), Some(up)) = ((-m.z_axis).try_normalize(), m.y_axis.try_normalize()) else {
         notices.add(&place, "its node has no direction (scale 0), left out");
         return Ok(None);
     };
     let eye = world_from_node.translation;
-    let (fov, near) = (f64::from(perspective.yfov), f64::from(perspective.znear));
-    let far = match perspective.zfar {
-        Some(far) => f64::from(far),
-        None => farthest(bounds, |p| forward.dot(p - eye)).max(2.0 * near),
+    let (lens, near, far) = match (&json.perspective, &json.orthographic) {
+        (Some(perspective), _) => {
+            let (fov_y_rad, near) = (f64::from(perspective.yfov), f64::from(perspective.znear));
+            let far = match perspective.zfar {
+                Some(far) => f64::from(far),
+                None => farthest(bounds, |p| forward.dot(p - eye)).max(2.0 * near),
+            };
+            let valid = fov_y_rad > 0.0 && fov_y_rad < std::f64::consts::PI - 1e-6 && near > 0.0;
+            if !(valid && far > near && far.is_finite()) {
+                notices.add(&place, "needs 0 < yfov < π and 0 < znear < zfar, left out");
+                return Ok(None);
+            }
+            (Lens::Perspective { fov_y_rad }, near, far)
+        }
+        // The picture's size decides the aspect ratio, as for perspective cameras.
+        (None, Some(orthographic)) => {
+            let height = 2.0 * f64::from(orthographic.ymag);
+            let (near, far) = (f64::from(orthographic.znear), f64::from(orthographic.zfar));
+            if !(height >= 1e-9 && near >= 0.0 && far > near && height.max(far).is_finite()) {
+                notices.add(&place, "needs 0 < ymag and 0 ≤ znear < zfar, left out");
+                return Ok(None);
+            }
+            (Lens::Orthographic { height }, near, far)
+        }
+        (None, None) => {
+            notices.add(&place, "is neither a perspective nor an orthographic camera, left out");
+            return Ok(None);
+        }
     };
-    let valid = fov > 0.0 && fov < std::f64::consts::PI - 1e-6 && near > 0.0 && far > near;
-    if !valid || !far.is_finite() {
-        notices.add(&place, "needs 0 < yfov < π and 0 < znear < zfar, left out");
-        return Ok(None);
-    }
     Ok(Some(SceneCamera {
         name: json.name.as_deref().or(node_name).unwrap_or_default().into(),
         eye,
@@ -60,7 +75,7 @@ pub(super) fn load_camera(
         // anywhere.
         target: eye + forward * far,
         up,
-        fov_y_rad: fov,
+        lens,
         near,
         far,
     }))

@@ -1,5 +1,6 @@
 use super::occupancy::{Occupancy, UP, is_seen};
 use super::{THUMBNAIL, thumbnail};
+use crate::types::Lens;
 use glam::DVec3;
 use std::collections::HashSet;
 
@@ -52,7 +53,7 @@ impl Judged {
         let mut facing_along = [0.0; 2];
         let mut seen = HashSet::new();
         let mut depths = Vec::new();
-        for direction in thumbnail(eye, target, fov_y_rad) {
+        for [_, direction] in thumbnail(eye, target, Lens::Perspective { fov_y_rad }) {
             let Some(sight) = grid.look(eye, direction) else {
                 counts.void += f64::from(u8::from(direction.y < 0.0)) / rays;
                 continue;

@@ -1,5 +1,6 @@
 use super::occupancy::Occupancy;
 use super::{THUMBNAIL, thumbnail};
+use crate::types::Lens;
 use glam::{DQuat, DVec3};
 use umbrage::{Light, PointLight, SpotLight};
 
@@ -19,15 +20,15 @@ pub(super) fn lighting(
     own: Option<Light>,
     eye: DVec3,
     target: DVec3,
-    fov_y_rad: f64,
+    lens: Lens,
 ) -> Lighting {
-    let seen: Vec<Option<DVec3>> = thumbnail(eye, target, fov_y_rad)
-        .map(|direction| {
-            let sight = grid.look(eye, direction)?;
+    let seen: Vec<Option<DVec3>> = thumbnail(eye, target, lens)
+        .map(|[start, direction]| {
+            let sight = grid.look(start, direction)?;
             // The point lies a little before the surface, so that the surface's own cells do not
             // shadow it.
             let back = 1.5 * grid.cell.max_element() / direction.length();
-            Some(eye + direction * (sight.distance - back).max(0.0))
+            Some(start + direction * (sight.distance - back).max(0.0))
         })
         .collect();
     // Surfaces this near a spot or point light do not hide it, because it may hang in a cage or

@@ -5,7 +5,7 @@ mod judge;
 mod lighting;
 mod occupancy;
 
-use crate::types::{Scene, SceneCamera, SceneLight};
+use crate::types::{Lens, Scene, SceneCamera, SceneLight};
 use candidates::{around, is_room, within};
 use glam::{DVec3, Vec3};
 use judge::Judged;
@@ -63,7 +63,7 @@ impl Scene {
                 },
                 b => {
                     let grid = Occupancy::of(self, b);
-                    lighting(&grid, None, view.eye, view.target, view.fov_y_rad).light
+                    lighting(&grid, None, view.eye, view.target, view.lens).light
                 }
             };
             SceneLight {
@@ -81,7 +81,8 @@ impl Scene {
 }
 
 fn camera(eye: DVec3, target: DVec3, fov_y_rad: f64, near: f64, far: f64) -> SceneCamera {
-    SceneCamera { name: "default".into(), eye, target, up: DVec3::Y, fov_y_rad, near, far }
+    let lens = Lens::Perspective { fov_y_rad };
+    SceneCamera { name: "default".into(), eye, target, up: DVec3::Y, lens, near, far }
 }
 
 /// Chooses the best of many candidate views.
@@ -115,7 +116,7 @@ fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera 
     judged.truncate(SHORT_LIST);
     // Among the best views, the one with the best score in its light is chosen.
     let lit_score = |j: &Judged| {
-        let lit = lighting(grid, light, j.eye, j.target, fov_y_rad);
+        let lit = lighting(grid, light, j.eye, j.target, Lens::Perspective { fov_y_rad });
         score(j) + light_weight * lit.score
     };
     let scores: Vec<f64> = judged.iter().map(lit_score).collect();
@@ -131,16 +132,20 @@ fn compose(grid: &Occupancy, bounds: Aabb, light: Option<Light>) -> SceneCamera 
     camera(best.eye, best.target, fov_y_rad, near, far)
 }
 
-/// Directions of unit depth from the eye through the pixels of a thumbnail, row by row from below.
-fn thumbnail(eye: DVec3, target: DVec3, fov_y_rad: f64) -> impl Iterator<Item = DVec3> {
+/// Lines of sight through the pixels of a thumbnail, row by row from below: where they begin, and
+/// their directions, of unit depth.
+fn thumbnail(eye: DVec3, target: DVec3, lens: Lens) -> impl Iterator<Item = [DVec3; 2]> {
     let forward = (target - eye).normalize();
     let right = forward.cross(DVec3::Y).normalize_or(DVec3::X);
     let up = right.cross(forward);
-    let slope = (fov_y_rad / 2.0).tan();
     let [width, height] = THUMBNAIL;
     (0..width * height).map(move |k| {
         let x = (f64::from(k % width) + 0.5) / f64::from(width) * 2.0 - 1.0;
         let y = (f64::from(k / width) + 0.5) / f64::from(height) * 2.0 - 1.0;
-        forward + right * (x * slope * ASPECT) + up * (y * slope)
+        let aside = right * (x * ASPECT) + up * y;
+        match lens {
+            Lens::Perspective { fov_y_rad } => [eye, forward + aside * (fov_y_rad / 2.0).tan()],
+            Lens::Orthographic { height } => [eye + aside * (height / 2.0), forward],
+        }
     })
 }

@@ -64,7 +64,7 @@ fn what_moves_is_drawn_into_the_maps_it_casts_into() {
         let around = |p: DVec3| Aabb::around([p - DVec3::splat(0.01), p + DVec3::splat(0.01)]);
         // The box at `far` lies in front of the ground of the last slice. The box `away` lies out
         // of the way of all maps.
-        let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
+        let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)).at(30.0);
         let into: Vec<usize> = (0..3).filter(|&i| plan.maps[i].may_cast(around(far))).collect();
         assert!(!into.is_empty() && into.len() < 3, "{into:?}");
         let boxes = [around(far)];
@@ -127,7 +127,7 @@ fn a_map_that_is_redrawn_leaves_its_neighbours() {
         })
     };
     assert_eq!(frame(Casters::Unmoved, true), [0; 3]);
-    let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)) * 30.0;
+    let far = EYE + camera(EYE).ray(glam::DVec2::new(320.0, 100.0)).at(30.0);
     let boxes = [Aabb::around([far])];
     let cleared = frame(Casters::MovedIn(&boxes), false);
     for (map, cleared) in plan.maps.iter().zip(cleared) {

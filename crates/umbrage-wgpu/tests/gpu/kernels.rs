@@ -69,7 +69,7 @@ fn points(plan: &Plan, count: usize) -> Vec<(DVec3, DVec3)> {
             let pixel = glam::DVec2::new(at(0) * 700.0 - 30.0, at(1) * 420.0 - 30.0);
             let depth = 0.1 * (at(2) * (700f64).ln()).exp();
             let normal = DVec3::new(at(3) - 0.5, at(4) - 0.5, at(5) - 0.5);
-            (plan.origin + camera.ray(pixel) * depth, normal)
+            (plan.origin + camera.ray(pixel).at(depth), normal)
         })
         .filter(|&(p, _)| is_receiver(p))
         .take(count)

@@ -4,7 +4,7 @@ use crate::bench;
 use crate::device::Bench;
 use bytemuck::cast_slice;
 use glam::{DVec2, DVec3};
-use umbrage::{Camera, LookAt, SeenTiles};
+use umbrage::{Camera, LookAt, Orthographic, SeenTiles};
 use umbrage_testing::needs;
 use umbrage_wgpu::{DepthProjection, Error, SeenReadback, Support};
 use wgpu::{
@@ -25,18 +25,27 @@ fn camera(eye: DVec3, image: [u32; 2]) -> Camera {
     .unwrap()
 }
 
+/// The same view in orthographic projection.
+fn orthographic(eye: DVec3, image: [u32; 2]) -> Camera {
+    let target = eye + DVec3::new(0.3, -0.25, -1.0);
+    let (up, height, near, far) = (DVec3::Y, 9.0, -2.0, 40.0);
+    Camera::orthographic(Orthographic { eye, target, up, height, near, far, image }).unwrap()
+}
+
 /// Distance along the view direction to a floor with pillars; infinite in the sky.
 fn distance(camera: &Camera, pixel: DVec2) -> f64 {
-    let (eye, ray) = (camera.eye(), camera.ray(pixel));
+    let sight = camera.ray(pixel);
+    let (eye, ray) = (camera.eye() + sight.start, sight.direction);
     let floor = if ray.y < 0.0 { -eye.y / ray.y } else { f64::INFINITY };
     let pillars = (0..12).map(|i| {
         let center = DVec3::new(f64::from(i % 4) * 3.0 - 4.0, 1.5, -f64::from(i / 4) * 4.0 - 1.0);
         let half = DVec3::new(0.3, 1.5, 0.3);
         let (a, b) = ((center - half - eye) / ray, (center + half - eye) / ray);
         let (start, end) = (a.min(b).max_element(), a.max(b).min_element());
-        if start <= end && start > 0.0 { start } else { f64::INFINITY }
+        if start <= end { start } else { f64::INFINITY }
     });
-    pillars.fold(floor, f64::min)
+    let is_seen = |depth: &f64| *depth >= camera.near();
+    pillars.chain([floor]).filter(is_seen).fold(f64::INFINITY, f64::min)
 }
 
 fn depth_texture(
@@ -145,8 +154,8 @@ fn depths(camera: &Camera, projection: DepthProjection) -> Vec<f32> {
         .map(|(x, y)| {
             let distance = distance(camera, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
             // Far planes clip what lies beyond.
-            (projection.at_infinity + projection.per_inverse_metre / distance).clamp(0.0, 1.0)
-                as f32
+            let nearness = if camera.is_orthographic() { -distance } else { distance.recip() };
+            (projection.base + projection.per_nearness * nearness).clamp(0.0, 1.0) as f32
         })
         .collect()
 }
@@ -157,18 +166,27 @@ fn depths(camera: &Camera, projection: DepthProjection) -> Vec<f32> {
 fn tiles_are_those_of_the_cpu() {
     let bench = bench();
     let plain = TextureFormat::Depth32Float;
-    for (format, samples, image, [near, far], is_reversed) in [
-        (plain, 1, [640, 360], [0.1, f64::INFINITY], true),
-        (plain, 4, [640, 360], [0.1, f64::INFINITY], true),
-        (plain, 1, [333, 97], [0.05, 200.0], false),
-        (plain, 1, [20, 7], [0.05, 200.0], true),
-        (TextureFormat::Depth24Plus, 1, [640, 360], [0.1, 100.0], false),
-        (TextureFormat::Depth24PlusStencil8, 4, [640, 360], [0.1, 100.0], false),
-        (TextureFormat::Depth16Unorm, 1, [640, 360], [0.5, 100.0], true),
+    for (format, samples, image, [near, far], is_reversed, is_orthographic) in [
+        (plain, 1, [640, 360], [0.1, f64::INFINITY], true, false),
+        (plain, 4, [640, 360], [0.1, f64::INFINITY], true, false),
+        (plain, 1, [333, 97], [0.05, 200.0], false, false),
+        (plain, 1, [20, 7], [0.05, 200.0], true, false),
+        (TextureFormat::Depth24Plus, 1, [640, 360], [0.1, 100.0], false, false),
+        (TextureFormat::Depth24PlusStencil8, 4, [640, 360], [0.1, 100.0], false, false),
+        (TextureFormat::Depth16Unorm, 1, [640, 360], [0.5, 100.0], true, false),
+        (plain, 1, [333, 97], [-2.0, 100.0], true, true),
+        (TextureFormat::Depth24Plus, 1, [640, 360], [-2.0, 100.0], false, true),
     ] {
-        let case = format!("{format:?} {samples} {image:?} {near} {far} {is_reversed}");
-        let projection = DepthProjection::of_range(near, far, is_reversed).unwrap();
-        let camera = camera(DVec3::new(-1.0, 1.8, 6.0), image);
+        let kind = if is_orthographic { "orthographic" } else { "perspective" };
+        let case = format!("{format:?} {samples} {image:?} {near} {far} {is_reversed} {kind}");
+        let eye = DVec3::new(-1.0, 1.8, 6.0);
+        let (camera, projection) = if is_orthographic {
+            let depths = DepthProjection::orthographic(near, far, is_reversed);
+            (orthographic(eye, image), depths.unwrap())
+        } else {
+            let depths = DepthProjection::of_range(near, far, is_reversed);
+            (camera(eye, image), depths.unwrap())
+        };
         let texture = depth_texture(&bench, image, format, samples);
         let mut readback = SeenReadback::new(&bench.device, &bench.support).unwrap();
         assert!(readback.latest(&bench.device).is_none());
@@ -184,18 +202,18 @@ fn tiles_are_those_of_the_cpu() {
             distance(&camera, DVec2::new(f64::from(x), f64::from(y)) + 0.5).min(far)
         };
         let expected = SeenTiles::of_depths(&camera, receiver).unwrap();
-        // The steps of the format, as inverse distances.
+        // The steps of the format, as nearness.
         let step = match format {
             TextureFormat::Depth16Unorm => 2f64.powi(-16),
             TextureFormat::Depth32Float => 2f64.powi(-23),
             _ => 2f64.powi(-24),
-        } / projection.per_inverse_metre.abs();
+        } / projection.per_nearness.abs();
         for (index, (found, expected)) in seen.tiles().iter().zip(expected.tiles()).enumerate() {
             let (Some(found), Some(expected)) = (found, expected) else {
                 assert_eq!(found.is_some(), expected.is_some(), "{case}: tile {index}");
                 continue;
             };
-            let thickness = |t: &umbrage::SeenTile| t.inverse[1] - t.inverse[0];
+            let thickness = |t: &umbrage::SeenTile| t.nearness[1] - t.nearness[0];
             let thicker = thickness(found) - 1.02 * thickness(expected);
             // Whether planes lean as surfaces do may depend on a coarse format's steps.
             let most = if format == TextureFormat::Depth16Unorm { 128.0 } else { 16.0 };
@@ -206,11 +224,12 @@ fn tiles_are_those_of_the_cpu() {
             let [x0, y0, x1, y1] = found.pixels;
             let middle = DVec2::new(x0 + x1, y0 + y1) / 2.0;
             for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
-                let inverse = receiver(x, y).recip();
+                let depth = receiver(x, y);
+                let nearness = if is_orthographic { -depth } else { depth.recip() };
                 let p = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
-                let above = inverse - found.slope.dot(p - middle);
-                let is_seen = inverse * camera.far() >= 1.0;
-                let is_held = found.inverse[0] <= above && above <= found.inverse[1];
+                let above = nearness - found.slope.dot(p - middle);
+                let is_seen = depth <= camera.far();
+                let is_held = found.nearness[0] <= above && above <= found.nearness[1];
                 assert!(!is_seen || is_held, "{case}: {index} {x} {y} {above} {found:?}");
             }
         }
@@ -266,8 +285,10 @@ fn bad_depths_are_named() {
     assert_eq!(try_out(projection, [64, 36]), Ok(()));
     let too_large = try_out(projection, [65, 36]).unwrap_err();
     assert!(too_large.to_string().contains("65x36"), "{too_large}");
-    for per_inverse_metre in [0.0, f64::NAN] {
-        let error = try_out(DepthProjection { per_inverse_metre, ..projection }, [64, 36]);
+    let orthographic = DepthProjection::orthographic(0.1, 10.0, false).unwrap();
+    let wrong = [0.0, f64::NAN].map(|per_nearness| DepthProjection { per_nearness, ..projection });
+    for projection in wrong.into_iter().chain([orthographic]) {
+        let error = try_out(projection, [64, 36]);
         assert!(matches!(error, Err(Error::Invalid { field: "depth", .. })), "{error:?}");
     }
     for support in [

@@ -223,7 +223,7 @@ pub(super) fn shape_errors(shape: &Shape, seen: &[Seen], camera: &Camera) -> [f6
         (s, t) = (s.max(p.base * w), t.max(p.height * w * w));
     }
     let texel = shape.texel_over_w(1.0, 0.0, [1.0; 2]);
-    let pixel = camera.pixel_width_per_depth();
+    let pixel = camera.pixel_width_per_scale();
     [s * texel.base / pixel, t * texel.height / pixel]
 }
 
@@ -285,11 +285,11 @@ impl ShadowMap {
 
 /// Largest m_s and m_t of a map over the body's vertices.
 fn unit_errors(map: &ShadowMap, body: &Body, camera: &Camera) -> [f64; 2] {
-    let pixel = camera.pixel_width_per_depth();
+    let pixel = camera.pixel_width_per_scale();
     body.vertices().iter().filter_map(|&v| Some((v, Local::at(map, v)?.footprint()))).fold(
         [0.0f64; 2],
         |[s, t], (v, footprint)| {
-            let width = camera.forward().dot(v) * pixel;
+            let width = camera.scale_of(v) * pixel;
             [s.max(footprint.base() / width), t.max(footprint.height() / width)]
         },
     )

@@ -6,15 +6,15 @@ use crate::camera::Camera;
 use glam::DVec3;
 
 /// The least emptiness for which a box is opened: the size of the empty space in it, as a share of
-/// its distance from the viewer. Errors grow by about this share where a box stands for what it
-/// contains.
+/// its distance from the viewer, or of an orthographic picture's height. Errors grow by about this
+/// share where a box stands for what it contains.
 const LEAST_EMPTINESS: f64 = 0.02;
 
 /// One part of this many of all boxes is opened for nearness.
 const NEAR_SHARE: usize = 4;
 
-/// The thickness that is added to all boxes, as a share of their distance from the viewer, so that
-/// flat boxes can be empty too.
+/// The thickness that is added to all boxes, as a share of the same length, so that flat boxes can
+/// be empty too.
 const THICKNESS: f64 = 0.01;
 
 /// The boxes chosen. The buffer is kept from frame to frame.
@@ -30,7 +30,8 @@ struct Chosen {
     node: BoxNode,
     /// A lower bound of the view depth of what is seen of the box, metres.
     distance: f64,
-    /// The volume of the empty space in the box over the cube of its distance; 0 for single boxes.
+    /// The volume of the empty space in the box over the cube of the picture's scale at its
+    /// distance; 0 for single boxes.
     emptiness: f64,
 }
 
@@ -90,7 +91,10 @@ impl Opening {
                 let seen_from = planes.iter().map(|&p| nearest_inside(aabb, camera.forward(), p));
                 let distance = seen_from.fold(camera.near(), f64::max);
                 let emptiness = match node.children {
-                    Some(_) => (aabb.size() / distance + THICKNESS).element_product() * node.empty,
+                    Some(_) => {
+                        (aabb.size() / camera.scale_at(distance) + THICKNESS).element_product()
+                            * node.empty
+                    }
                     None => 0.0,
                 };
                 Chosen { node, distance, emptiness }
@@ -108,7 +112,10 @@ impl Opening {
         };
         let most_empty = most - most / NEAR_SHARE;
         self.replace(by_emptiness, open, most_empty);
-        self.replace(by_nearness, open, most);
+        // Errors do not depend on distance in orthographic views.
+        if !camera.is_orthographic() {
+            self.replace(by_nearness, open, most);
+        }
         self.replace(by_emptiness, open, most);
         self.boxes.clear();
         self.boxes.extend(self.chosen.iter().map(|chosen| chosen.node.aabb));

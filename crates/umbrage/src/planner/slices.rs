@@ -33,6 +33,9 @@ impl Planner {
     pub(super) fn draft_slices(&mut self, part: Part, along: &Along, request: &Request<'_>) {
         let technique = request.technique;
         let (mut partition, mut warp) = (technique.partition, technique.warp);
+        if request.camera.is_orthographic() {
+            warp = warp.without_perspective();
+        }
         if part.face == Some(Face::Near) {
             // All pixels on the near face have the same width, so it needs neither slices nor a
             // warp.
@@ -64,7 +67,7 @@ impl Planner {
             let depths = body.vertices().iter().map(|&v| along.depth_of(v, camera));
             range(depths.map(|d| d.clamp(camera.near(), camera.far()))).into()
         };
-        partition::split(partition, [n, f], |from, to| {
+        partition::split(partition, [n, f], camera, |from, to| {
             let begin = (from > n).then(|| along.plane_at(from, camera)).flatten();
             let end = (to < f).then(|| along.plane_at(to, camera)).flatten().map(Plane::flipped);
             clip_between(&mut draft.body, body, [begin, end]);

@@ -1,7 +1,7 @@
 //! The convex cells that the planner takes as receivers.
 
 use super::motion::{self, Motion};
-use super::{BEYOND, Seen, SeenTile, SeenTiles};
+use super::{BEYOND, Seen, SeenTile, SeenTiles, beyond, depth, nearness};
 use crate::bounds::Aabb;
 use crate::camera::Camera;
 use crate::math::Keyed;
@@ -51,11 +51,13 @@ impl Cells {
         let [most_seen, most_at_edges] = MAX_CELLS;
         // Cells are relative to the camera that saw them.
         let shift = seen.camera.eye() - camera.eye();
-        pyramid.open(most_seen, |tile| cells.push(tile.cell(&seen.camera).map(|p| p + shift)));
+        pyramid.open(most_seen, &seen.camera, |tile| {
+            cells.push(tile.cell(&seen.camera).map(|p| p + shift));
+        });
         if seen.camera != *camera {
             motion.find_edges(seen, camera, boxes, clearance);
             pyramid.build(motion::EDGE_TILES, motion.edges.iter().copied());
-            pyramid.open(most_at_edges, |tile| cells.push(tile.cell(camera)));
+            pyramid.open(most_at_edges, camera, |tile| cells.push(tile.cell(camera)));
         }
         Some(cells.iter().copied())
     }
@@ -65,29 +67,38 @@ impl SeenTile {
     /// The cell's corners relative to the camera's eye.
     fn cell(&self, camera: &Camera) -> [DVec3; 8] {
         let corners = self.corners();
-        let floor = (2.0 * BEYOND * camera.far()).recip();
-        let mut inverses = corners.map(|c| c.inverse);
+        let floor = nearness(camera, beyond(camera, 2.0 * BEYOND));
+        let mut nearnesses = corners.map(|c| c.nearness);
         // Where a face would come near the horizon, both are turned towards the viewer: limiting
         // single corners would bend the face and leave receivers outside.
-        if inverses.iter().any(|[lo, _]| *lo < floor) {
-            let nearest = inverses.iter().fold(floor, |n, [_, hi]| n.max(*hi));
-            inverses = [[floor, nearest]; 4];
+        if nearnesses.iter().any(|[lo, _]| *lo < floor) {
+            let nearest = nearnesses.iter().fold(floor, |n, [_, hi]| n.max(*hi));
+            nearnesses = [[floor, nearest]; 4];
         }
+        // Flat cells get a thickness far below the resolution of single precision, so that they have
+        // an inside.
+        let farthest = nearnesses.iter().flatten().fold(0.0, |most: f64, w| most.max(w.abs()));
+        let pad = 1e-7 * (camera.scale_at(0.0) + farthest);
         std::array::from_fn(|i| {
-            // Flat cells get a thickness far below the resolution of single precision, so that they
-            // have an inside.
-            let [lo, hi] = inverses[i % 4];
-            let inverse = if i < 4 { lo * (1.0 - 1e-7) } else { hi * (1.0 + 1e-7) };
-            camera.ray(corners[i % 4].at) / inverse
+            let [lo, hi] = match camera.is_orthographic() {
+                true => [nearnesses[i % 4][0] - pad, nearnesses[i % 4][1] + pad],
+                false => [nearnesses[i % 4][0] * (1.0 - 1e-7), nearnesses[i % 4][1] * (1.0 + 1e-7)],
+            };
+            let nearness = if i < 4 { lo } else { hi };
+            camera.ray(corners[i % 4].at).at(depth(camera, nearness))
         })
     }
 
     /// How much a cell is worth opening: its part of the picture, times the logarithm of the factor
     /// by which depth varies, times its nearness, because near receivers set how many texels a map
-    /// needs.
-    fn looseness(&self, floor: f64) -> f64 {
+    /// needs. In orthographic views it is the cell's volume.
+    fn looseness(&self, camera: &Camera) -> f64 {
+        if camera.is_orthographic() {
+            return self.size().element_product() * self.thickness();
+        }
+        let floor = 1e-12;
         let ratio = self.corners().iter().fold(1.0, |product, c| {
-            let [lo, hi] = c.inverse.map(|w| w.max(floor));
+            let [lo, hi] = c.nearness.map(|w| w.max(floor));
             product * (hi / lo)
         });
         self.size().element_product() * ratio.ln() * self.nearest()
@@ -146,13 +157,13 @@ impl Pyramid {
         self.tiles[start + (y * size[0] + x) as usize]
     }
 
-    /// Opens the loosest tiles until there are at most `most`, and gives what is left to `give`.
-    fn open(&mut self, most: usize, mut give: impl FnMut(SeenTile)) {
-        let floor = 1e-12;
+    /// Opens the loosest tiles of a camera's picture until there are at most `most`, and gives what
+    /// is left to `give`.
+    fn open(&mut self, most: usize, camera: &Camera, mut give: impl FnMut(SeenTile)) {
         let top = self.levels.len() - 1;
         self.open.clear();
         let candidate = |this: &Self, level: usize, place: [u32; 2]| {
-            let key = this.tile(level, place)?.looseness(floor);
+            let key = this.tile(level, place)?.looseness(camera);
             Some(Keyed { key, value: Candidate { level, place } })
         };
         self.open.extend(candidate(self, top, [0, 0]));

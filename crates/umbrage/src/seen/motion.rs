@@ -2,7 +2,7 @@
 //!
 //! All vectors are in the earlier camera's frame: x right, y up, z along its view. Let the camera
 //! move by t, and let the new camera see a point P that was hidden. The segment from P to the new
-//! eye is free. In the earlier picture it is a straight line on which the inverse depth w grows,
+//! eye is free. In the earlier picture it is a straight line on which the nearness w grows,
 //! from P, which lies behind the surface that hides it, to points before everything seen. So the
 //! line either leaves the picture or crosses a silhouette, at a point X of the segment. With the
 //! slopes m = (x/z, y/z),
@@ -10,12 +10,16 @@
 //! m(X) − m(P) = (t_xy − m(X) t_z) (w(X) − w(P)) / (1 − t_z w(X)),
 //!
 //! as follows from X = t + u (P − t). Hence P lies no farther from the silhouette than this with
-//! w(X) − w(P) replaced by the inverse depth of the silhouette's near side, and the gap opens by
-//! no more than this with the silhouette's jump of inverse depth.
+//! w(X) − w(P) replaced by the nearness of the silhouette's near side, and the gap opens by
+//! no more than this with the silhouette's jump of nearness.
+//!
+//! An orthographic picture only shifts where the camera moves without turning, so nothing comes into
+//! view but at its edges. Where the camera turns, gaps open as for an eye infinitely far away.
 
-use super::{BEYOND, SeenTile, SeenTiles, tile_pixels};
-use crate::bounds::Aabb;
-use crate::camera::Camera;
+use super::{BEYOND, SeenTile, SeenTiles, beyond, depth, nearness, tile_pixels};
+use crate::bounds::{Aabb, Plane};
+use crate::camera::{Camera, ViewRay};
+use crate::focus::frustum_planes;
 use crate::math::range;
 use glam::{DVec2, DVec3};
 
@@ -49,6 +53,17 @@ impl Motion {
     pub(super) fn new(seen: &SeenTiles, camera: &Camera) -> Option<Self> {
         let before = seen.camera();
         let t = camera.eye() - before.eye();
+        if before.is_orthographic() || camera.is_orthographic() {
+            let shifts = before.is_orthographic() == camera.is_orthographic()
+                && before.forward() == camera.forward();
+            // The near plane must not have come to what was seen, or what lies behind shows.
+            let near = camera.near() + before.forward().dot(t);
+            let is_whole =
+                seen.tiles().iter().flatten().all(|t| depth(before, t.nearest()) >= near);
+            // In the earlier picture nothing moves.
+            let motion = Self { sideways: DVec2::ZERO, forward: 0.0 };
+            return (shifts && is_whole).then_some(motion);
+        }
         let sideways = DVec2::new(before.right().dot(t), before.up().dot(t));
         let forward = before.forward().dot(t);
         let nearest = seen.tiles().iter().flatten().fold(0.0, |n: f64, t| n.max(t.nearest()));
@@ -56,7 +71,7 @@ impl Motion {
     }
 
     /// The direction in which what was hidden moves out of hiding, at a slope of the view, and how
-    /// far for each 1/m of inverse depth.
+    /// far for each 1/m of nearness.
     fn parallax(&self, slope: DVec2) -> DVec2 {
         self.sideways - slope * self.forward
     }
@@ -64,8 +79,8 @@ impl Motion {
 
 /// Slope of the view at a pixel position.
 fn slope(camera: &Camera, at: DVec2) -> DVec2 {
-    let ray = camera.ray(at);
-    DVec2::new(camera.right().dot(ray), camera.up().dot(ray))
+    let direction = camera.ray(at).direction;
+    DVec2::new(camera.right().dot(direction), camera.up().dot(direction))
 }
 
 impl Buffers {
@@ -78,7 +93,7 @@ impl Buffers {
         moving: &[Aabb],
     ) {
         let camera = seen.camera();
-        let limits = [camera.near(), BEYOND * camera.far()];
+        let limits = [camera.near(), beyond(camera, BEYOND)];
         box_depths(camera, limits, boxes, &mut self.boxes);
         box_depths(camera, limits, moving, &mut self.moving);
         let grid = [SeenTiles::ACROSS, SeenTiles::DOWN];
@@ -118,7 +133,8 @@ impl Buffers {
                 let tile = tile.filter(|_| *is_uncovered)?;
                 let place = [index as u32 % grid[0], index as u32 / grid[0]];
                 let [nearest, farthest] = boxes[coarse(place)];
-                facing(tile.pixels, [nearest.max(tile.nearest().recip()), farthest])
+                let nearest = nearest.max(depth(camera, tile.nearest()));
+                facing(camera, tile.pixels, [nearest, farthest])
             },
         ));
     }
@@ -135,29 +151,21 @@ impl Buffers {
         box_depths(camera, [nearest, camera.far()], boxes, &mut self.boxes);
         let before = seen.camera();
         let t = camera.eye() - before.eye();
-        let [lo, _, hi, _] = before.corner_slopes();
-        let (right, up, forward) = (before.right(), before.up(), before.forward());
-        // Half-spaces n · p + d ≥ 0, where p is relative to the earlier eye, around everything that
-        // the earlier camera could see.
-        let around = [
-            (right - forward * lo.x, 0.0),
-            (forward * hi.x - right, 0.0),
-            (up - forward * lo.y, 0.0),
-            (forward * hi.y - up, 0.0),
-            (forward, -before.near()),
-            (-forward, BEYOND * before.far()),
-        ];
+        // Half-spaces, relative to the earlier eye, around everything that the earlier camera could
+        // see.
+        let [near, far, sides @ ..] = frustum_planes(before);
+        let far = Plane { offset: beyond(before, BEYOND), ..far };
         self.edges.clear();
         self.edges.extend(self.boxes.iter().enumerate().map(|(index, &[nearest, farthest])| {
             let pixels = tile_pixels(camera.image(), EDGE_TILES, index).map(f64::from);
             // The range of new depths in which all of the tile lay within the earlier view.
-            let mut inside = [0.0f64, f64::INFINITY];
+            let mut inside = [f64::NEG_INFINITY, f64::INFINITY];
             for at in corners(pixels) {
                 let ray = camera.ray(at);
-                for (normal, offset) in around {
-                    let start = normal.dot(t) + offset;
+                for plane in [near, far].iter().chain(&sides) {
                     // Rounding must not make anything of a view that has not changed.
-                    let rise = normal.dot(ray) + 1e-9 * normal.length();
+                    let start = plane.distance(ray.at(0.0) + t) + 1e-9 * ray.start.length();
+                    let rise = plane.normal.dot(ray.direction) + 1e-9;
                     if rise > 0.0 {
                         inside[0] = inside[0].max(-start / rise);
                     } else {
@@ -171,7 +179,7 @@ impl Buffers {
             // Rounding must not make a range of what ends where it begins.
             let ranges = [before, beyond].into_iter().filter(|[near, far]| near * 1.000_001 < *far);
             let (near, far) = range(ranges.flatten());
-            facing(pixels, [near, far])
+            facing(camera, pixels, [near, far])
         }));
     }
 }
@@ -205,11 +213,11 @@ fn reach(camera: &Camera, motion: &Motion, tile: &SeenTile, place: [u32; 2]) -> 
 }
 
 /// A tile between two depths, metres; `None` if the first is not the lesser.
-fn facing(pixels: [f64; 4], [near, far]: [f64; 2]) -> Option<SeenTile> {
+fn facing(camera: &Camera, pixels: [f64; 4], [near, far]: [f64; 2]) -> Option<SeenTile> {
     (near <= far).then(|| SeenTile {
         pixels,
         slope: DVec2::ZERO,
-        inverse: [far.recip(), near.recip()],
+        nearness: [far, near].map(|depth| nearness(camera, depth)),
         jump: 0.0,
     })
 }
@@ -264,11 +272,14 @@ fn depths_within(
     [mut near, mut far]: [f64; 2],
 ) -> Option<[f64; 2]> {
     let rays = corners(pixels).map(|at| camera.ray(at));
-    let lo = rays.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-    let hi = rays.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-    // Along each axis, a point at depth z lies between z·lo and z·hi.
+    let bounds = |vector: fn(&ViewRay) -> DVec3| Aabb::around(rays.iter().map(vector));
+    let [start, rate] = [bounds(|ray| ray.start), bounds(|ray| ray.direction)];
+    // Along each axis, a point at depth z lies between start.min + z·rate.min and start.max +
+    // z·rate.max. (In perspective views start is 0, in orthographic ones rate is the same for all.)
     for axis in 0..3 {
-        for (rate, limit) in [(lo[axis], aabb.max[axis]), (-hi[axis], -aabb.min[axis])] {
+        let above = (rate.min[axis], aabb.max[axis] - start.min[axis]);
+        let below = (-rate.max[axis], start.max[axis] - aabb.min[axis]);
+        for (rate, limit) in [above, below] {
             // z · rate ≤ limit.
             if rate > 0.0 {
                 far = far.min(limit / rate);
@@ -280,6 +291,7 @@ fn depths_within(
         }
     }
     // Rounding must not lose a flat box.
-    let [near, far] = [near * (1.0 - 1e-9), far * (1.0 + 1e-9)];
-    (near <= far && far > 0.0).then_some([near, far])
+    let pad = |depth: f64| 1e-9 * (depth.abs() + camera.scale_at(0.0));
+    let [near, far] = [near - pad(near), far + pad(far)];
+    (near <= far).then_some([near, far])
 }

@@ -3,7 +3,7 @@
 use super::cells::Cells;
 use super::{Seen, SeenTiles};
 use crate::bounds::{Aabb, Plane};
-use crate::camera::{Camera, LookAt};
+use crate::camera::{Camera, LookAt, Orthographic};
 use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
@@ -21,8 +21,11 @@ impl Scene {
         let ray = camera.ray(pixel);
         let mut nearest = (f64::INFINITY, usize::MAX);
         for (index, &(aabb, is_ball)) in self.things.iter().enumerate() {
-            let around = aabb.relative_to(camera.eye());
-            let depth = if is_ball { ball(around, ray) } else { entry(around, ray) };
+            let around = aabb.relative_to(camera.eye() + ray.start);
+            let depth = match is_ball {
+                true => ball(around, ray.direction),
+                false => entry(around, ray.direction),
+            };
             if let Some(depth) = depth
                 && depth >= camera.near()
                 && depth < nearest.0
@@ -47,20 +50,20 @@ fn center(x: u32, y: u32) -> DVec2 {
     DVec2::new(f64::from(x), f64::from(y)) + 0.5
 }
 
-/// Where a ray from the origin enters a box.
+/// Where the line through the origin enters a box.
 fn entry(aabb: Aabb, ray: DVec3) -> Option<f64> {
     let (a, b) = (aabb.min / ray, aabb.max / ray);
     let (start, end) = (a.min(b).max_element(), a.max(b).min_element());
-    (start <= end && start > 0.0).then_some(start)
+    (start <= end).then_some(start)
 }
 
-/// Where a ray from the origin enters the ball within a cube.
+/// Where the line through the origin enters the ball within a cube.
 fn ball(aabb: Aabb, ray: DVec3) -> Option<f64> {
     let (center, radius) = (aabb.center(), aabb.size().x / 2.0);
     let (a, b, c) =
         (ray.length_squared(), ray.dot(center), center.length_squared() - radius * radius);
     let root = b * b - a * c;
-    (root >= 0.0).then(|| (b - root.sqrt()) / a).filter(|&t| t > 0.0)
+    (root >= 0.0).then(|| (b - root.sqrt()) / a)
 }
 
 fn scene() -> impl Strategy<Value = Scene> {
@@ -83,21 +86,42 @@ fn scene() -> impl Strategy<Value = Scene> {
 }
 
 fn camera(eye: DVec3, turn: DVec2) -> Camera {
-    camera_with(eye, turn, 1.0, IMAGE)
+    camera_with(eye, turn, Lens::Perspective(1.0), IMAGE)
 }
 
-fn camera_with(eye: DVec3, turn: DVec2, fov_y_rad: f64, image: [u32; 2]) -> Camera {
-    let toward = DVec3::new(turn.x, turn.y - 0.2, -1.0);
-    Camera::look_at(LookAt {
-        eye,
-        target: eye + toward,
-        up: DVec3::Y,
-        fov_y_rad,
-        near: 0.1,
-        far: 50.0,
-        image,
-    })
-    .unwrap()
+/// A field of view in radians, or a height in metres.
+#[derive(Clone, Copy, Debug)]
+enum Lens {
+    Perspective(f64),
+    Orthographic(f64),
+}
+
+fn lens() -> impl Strategy<Value = Lens> {
+    prop_oneof![Just(Lens::Perspective(1.0)), (2.0..20.0f64).prop_map(Lens::Orthographic)]
+}
+
+impl Lens {
+    fn zoomed(self, factor: f64) -> Self {
+        match self {
+            Self::Perspective(fov_y_rad) => Self::Perspective(fov_y_rad * factor),
+            Self::Orthographic(height) => Self::Orthographic(height * factor),
+        }
+    }
+}
+
+fn camera_with(eye: DVec3, turn: DVec2, lens: Lens, image: [u32; 2]) -> Camera {
+    let target = eye + DVec3::new(turn.x, turn.y - 0.2, -1.0);
+    let (up, near, far) = (DVec3::Y, 0.1, 50.0);
+    let camera = match lens {
+        Lens::Perspective(fov_y_rad) => {
+            Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
+        }
+        Lens::Orthographic(height) => {
+            // Some things lie behind the eye.
+            Camera::orthographic(Orthographic { eye, target, up, height, near: -5.0, far, image })
+        }
+    };
+    camera.unwrap()
 }
 
 /// The planes around every cell, and around the moving boxes, relative to the eye; `None` where
@@ -140,7 +164,7 @@ fn lost(scene: &Scene, camera: &Camera, cells: &[Vec<Plane>]) -> (Vec<[u32; 2]>,
         let (depth, _) = scene.hit(camera, center(x, y));
         if depth <= camera.far() {
             count += 1;
-            if !holds(cells, camera.ray(center(x, y)) * depth) {
+            if !holds(cells, camera.ray(center(x, y)).at(depth)) {
                 lost.push([x, y]);
             }
         }
@@ -150,13 +174,13 @@ fn lost(scene: &Scene, camera: &Camera, cells: &[Vec<Plane>]) -> (Vec<[u32; 2]>,
 
 /// Whether different things, or different sides of one, show within a pixel of this one.
 fn is_at_silhouette(scene: &Scene, camera: &Camera, [x, y]: [u32; 2]) -> bool {
-    let inverse = |dx: f64, dy: f64| {
+    let nearness = |dx: f64, dy: f64| {
         let (depth, thing) = scene.hit(camera, center(x, y) + DVec2::new(dx, dy));
         (depth.recip(), thing)
     };
-    let (middle, thing) = inverse(0.0, 0.0);
+    let (middle, thing) = nearness(0.0, 0.0);
     [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]].into_iter().any(|[dx, dy]| {
-        let [a, b] = [inverse(dx, dy), inverse(-dx, -dy)];
+        let [a, b] = [nearness(dx, dy), nearness(-dx, -dy)];
         a.1 != thing || b.1 != thing || (a.0 - 2.0 * middle + b.0).abs() > 1e-3 * middle
     })
 }
@@ -173,13 +197,15 @@ proptest! {
         scene in scene(),
         [x, y, z] in [-10.0..10.0f64, 0.3..6.0, 1.0..12.0],
         turn in [-1.0..1.0f64, -0.6..0.4],
+        lens in lens(),
     ) {
-        let camera = camera(DVec3::new(x, y, z), turn.into());
+        let camera = camera_with(DVec3::new(x, y, z), turn.into(), lens, IMAGE);
         let seen = scene.seen(&camera);
         let seen = Seen { tiles: &seen, moving: &[], clearance: 0.0 };
         let cells = cells(seen, &camera, &[]).expect("a camera that stands still");
         let (lost, count) = lost(&scene, &camera, &cells);
-        prop_assert!(count > 0 && lost.is_empty(), "{lost:?} of {count}");
+        let shows_much = camera.is_orthographic() || count > 0;
+        prop_assert!(shows_much && lost.is_empty(), "{lost:?} of {count}");
     }
 
     #[test]
@@ -190,15 +216,16 @@ proptest! {
         step in prop::array::uniform3(-1.0..1.0f64),
         stride in 0.0..1.0f64,
         turning in prop_oneof![Just([0.0, 0.0]), [-0.3..0.3f64, -0.2..0.2]],
-        (fov_y_rad, image) in prop_oneof![
+        lens in lens(),
+        (zoom, image) in prop_oneof![
             3 => Just((1.0, IMAGE)),
-            1 => (0.6..1.3f64).prop_map(|fov_y_rad| (fov_y_rad, [150, 110])),
+            1 => (0.6..1.3f64).prop_map(|zoom| (zoom, [150, 110])),
         ],
     ) {
         let eye = DVec3::new(x, y, z);
-        let before = camera(eye, turn.into());
+        let before = camera_with(eye, turn.into(), lens, IMAGE);
         let turn = DVec2::from(turn) + DVec2::from(turning);
-        let after = camera_with(eye + DVec3::from(step) * stride, turn, fov_y_rad, image);
+        let after = camera_with(eye + DVec3::from(step) * stride, turn, lens.zoomed(zoom), image);
         let seen = scene.seen(&before);
         let boxes = scene.boxes();
         let seen = Seen { tiles: &seen, moving: &[], clearance: 0.0 };
@@ -217,10 +244,11 @@ proptest! {
         turn in [-1.0..1.0f64, -0.6..0.4],
         shift in [-3.0..3.0f64, 0.0..2.0, -3.0..3.0],
         step in prop_oneof![Just([0.0; 3]), prop::array::uniform3(-0.2..0.2f64)],
+        lens in lens(),
     ) {
         let eye = DVec3::new(x, y, z);
-        let before = camera(eye, turn.into());
-        let after = camera(eye + DVec3::from(step), turn.into());
+        let before = camera_with(eye, turn.into(), lens, IMAGE);
+        let after = camera_with(eye + DVec3::from(step), turn.into(), lens, IMAGE);
         let seen = scene.seen(&before);
         let mut later = scene.clone();
         let thing = &mut later.things[1].0;
@@ -255,14 +283,14 @@ fn bad_tiles_and_depths_are_named() {
     let good = super::SeenTile {
         pixels: [0.0, 0.0, 5.0, 5.0],
         slope: DVec2::ZERO,
-        inverse: [0.1, 0.2],
+        nearness: [0.1, 0.2],
         jump: 0.0,
     };
     let mut seen = SeenTiles::new(&camera);
     assert_eq!(seen.set(&camera, |_| Some(good)), Ok(()));
     for bad in [
-        super::SeenTile { inverse: [0.2, 0.1], ..good },
-        super::SeenTile { inverse: [0.1, f64::INFINITY], ..good },
+        super::SeenTile { nearness: [0.2, 0.1], ..good },
+        super::SeenTile { nearness: [0.1, f64::INFINITY], ..good },
         super::SeenTile { slope: DVec2::NAN, ..good },
         super::SeenTile { pixels: [5.0, 0.0, 0.0, 5.0], ..good },
         super::SeenTile { jump: f64::NAN, ..good },

@@ -145,8 +145,8 @@ impl Search {
         if exact(0.0) <= exact(nu) { 0.0 } else { nu }
     }
 
-    /// Sets the points where errors may be largest. Of many points, those of similar view depth
-    /// count as one.
+    /// Sets the points where errors may be largest. Of many points, those of a similar scale
+    /// of the view, hence of similar view depth, count as one.
     fn set_front(&mut self, family: &OnePoint, seen: &[Seen]) {
         self.front.clear();
         if seen.len() <= FEW {
@@ -158,7 +158,7 @@ impl Search {
         let [first, last] = [family.nearest, family.farthest].map(f64::to_bits);
         let per_bit = (RANGES as f64 - 0.5) / (last - first).max(1) as f64;
         for p in seen {
-            let index = (p.depth.to_bits() - first) as f64 * per_bit;
+            let index = (p.scale.to_bits() - first) as f64 * per_bit;
             let range = &mut ranges[(index as usize).min(RANGES - 1)];
             range.z = range.z.max(p.xz.y);
             range.base = range.base.max(p.base);

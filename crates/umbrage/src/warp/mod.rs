@@ -24,9 +24,10 @@ pub(crate) struct Seen {
     pub xz: DVec2,
     /// Light-space y.
     pub y: f64,
-    /// Distance along the view, metres, > 0.
-    pub depth: f64,
-    /// Length perpendicular to the beam of a unit of light-space x, metres, over `depth`.
+    /// The [scale](Camera::scale_at) of the view, metres, > 0: the distance along the view, or in
+    /// orthographic views a constant.
+    pub scale: f64,
+    /// Length perpendicular to the beam of a unit of light-space x, metres, over `scale`.
     pub base: f64,
     /// The same for a unit of light-space z, measured perpendicular to that length.
     pub height: f64,
@@ -35,7 +36,7 @@ pub(crate) struct Seen {
 impl Seen {
     pub(crate) fn new(p: DVec3, space: &LightSpace, camera: &Camera) -> Self {
         let (xz, y) = space.project(p);
-        let depth = camera.forward().dot(p);
+        let scale = camera.scale_of(p);
         let (base, height) = match space.apex {
             None => (1.0, 1.0),
             Some(apex) => {
@@ -48,7 +49,7 @@ impl Seen {
                 (base, u.cross(v).length() / base)
             }
         };
-        Self { xz, y, depth, base: base / depth, height: height / depth }
+        Self { xz, y, scale, base: base / scale, height: height / scale }
     }
 }
 
@@ -142,7 +143,8 @@ pub(crate) struct OnePoint {
     z0: f64,
     /// Depth range μ, light-space units, > 0.
     mu: f64,
-    /// View distances of the nearest and the farthest point seen, metres.
+    /// The view's least and greatest scale over the points seen, metres: the distances of the
+    /// nearest and the farthest of them, or a constant.
     nearest: f64,
     farthest: f64,
 }
@@ -152,7 +154,7 @@ impl OnePoint {
     pub(crate) fn around(view: &View<'_>, space: &LightSpace) -> Self {
         let (x0, x1) = range(view.outline.iter().map(|p| p.x));
         let (z0, z1) = range(view.outline.iter().map(|p| p.y));
-        let (nearest, farthest) = range(view.seen.iter().map(|p| p.depth));
+        let (nearest, farthest) = range(view.seen.iter().map(|p| p.scale));
         // The viewer is local space's origin. After a spot light's perspective the viewer's image
         // may lie at or beyond infinity; the middle of the points seen replaces it there.
         let center_x = if space.apex.is_some() { x0.midpoint(x1) } else { 0.0 };
@@ -195,7 +197,7 @@ impl OnePoint {
                 // As the view direction passes the light direction, z turns to its opposite, and
                 // the best strength for one z is not the best for the other. So the strength fades
                 // out before.
-                let phi = camera.tan_half_fov_y().atan();
+                let phi = camera.half_height().atan();
                 let fade = (4.0 * space.sin_theta / phi.sin()).min(1.0);
                 search.least_error(self, view, objective, precision, fade)
             }
@@ -215,7 +217,7 @@ impl OnePoint {
                 let nu = (0.8 * self.mu - delta) / (0.2 * delta.max(0.0));
                 // The published rule does not fade out as the view direction approaches the light
                 // direction, where z is undefined. Here the strength fades out for θ < φ.
-                let phi = camera.tan_half_fov_y().atan();
+                let phi = camera.half_height().atan();
                 nu.min(view.strength(view.n)) * (view.sin_theta / phi.sin()).min(1.0)
             }),
         };

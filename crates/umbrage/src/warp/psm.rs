@@ -17,7 +17,7 @@ const AT_INFINITY: f64 = 1e-8;
 pub(crate) fn psm(space: &LightSpace, camera: &Camera, vertices: &[DVec3]) -> Option<DMat3> {
     let (n, f) = (camera.near(), camera.far());
     let forward = camera.forward();
-    let slope_y = camera.tan_half_fov_y();
+    let slope_y = camera.half_height();
     let [width, height] = camera.image().map(f64::from);
     let slope_x = slope_y * width / height;
     // q = (x, y, z, w), where x and y range over about ±1, z over 0 to 1, and w is the view depth.

@@ -4,8 +4,8 @@
 use glam::DVec3;
 use proptest::prelude::*;
 use umbrage::{
-    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, MapError, Objective, Partition,
-    Plan, Plane, Planner, PointLight, Slab, Splits, SpotLight, Technique, Warp,
+    Aabb, Bounds, Camera, Cover, Faces, Light, Limits, LookAt, MapError, Objective, Orthographic,
+    Partition, Plan, Plane, Planner, PointLight, Slab, Splits, SpotLight, Technique, Warp,
 };
 
 /// How a map's texels are spread, and what the map covers.
@@ -76,6 +76,7 @@ fn log_range(lo: f64, hi: f64) -> impl Strategy<Value = f64> {
     (lo.ln()..hi.ln()).prop_map(f64::exp)
 }
 
+/// Perspective and orthographic views.
 pub(crate) fn camera() -> impl Strategy<Value = Camera> {
     camera_with(1.0, 10.0..120.0, 1e4)
 }
@@ -101,20 +102,33 @@ fn camera_with(
         log_range(0.01, 10.0),
         log_range(1.001, most_ratio),
         prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
+        orthographic_height(),
     )
-        .prop_map(move |(eye, forward, up, fov, near, ratio, image)| {
+        .prop_map(move |(eye, forward, up, fov, near, ratio, image, height)| {
             let (target, near) = (eye + forward * scale, near * scale);
-            Camera::look_at(LookAt {
-                eye,
-                target,
-                up,
-                fov_y_rad: fov.to_radians(),
-                near,
-                far: (near * ratio).min(1e9),
-                image,
-            })
-            .expect("a valid camera")
+            let far = (near * ratio).min(1e9);
+            let camera = match height {
+                None => {
+                    let fov_y_rad = fov.to_radians();
+                    Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
+                }
+                // The near plane of some views lies at the eye or behind it.
+                Some((height, before_eye)) => {
+                    let length = far - near;
+                    let near = near.min(length) * before_eye;
+                    let (height, far) = (height * length, near + length);
+                    Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
+                }
+            };
+            camera.expect("a valid camera")
         })
+}
+
+/// The height of an orthographic view over its range of depths, and where it begins; `None` for
+/// perspective views.
+fn orthographic_height() -> impl Strategy<Value = Option<(f64, f64)>> {
+    let begin = prop_oneof![2 => Just(1.0), 1 => Just(0.0), 1 => -2.0..1.0f64];
+    proptest::option::weighted(0.4, (log_range(0.01, 100.0), begin))
 }
 
 /// Views as [`camera`] gives, and odd ones: of micrometres and of a hundred thousand kilometres, as
@@ -196,7 +210,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
         move |([x, y, z], from, half, distance)| {
             let seen = point_in_view(&camera, [x, y, z]);
-            let distance = distance * camera.far();
+            let distance = distance * reach(&camera);
             Light::Spot(SpotLight {
                 position: seen - from * distance,
                 direction: from,
@@ -212,7 +226,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
 fn point(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.0..1.0f64, 0.0..1.0, 0.0..1.0], direction(), log_range(1e-3, 3.0)).prop_map(
         move |(place, away, distance)| {
-            let distance = distance * camera.far();
+            let distance = distance * reach(&camera);
             Light::Point(PointLight {
                 position: point_in_view(&camera, place) + away * distance,
                 near: (distance * 0.01).max(1e-12),
@@ -254,26 +268,26 @@ fn odd_light(camera: Camera) -> impl Strategy<Value = Light> {
     let suns = prop_oneof![2 => across.boxed(), 1 => along.boxed(), 1 => axis().boxed()]
         .prop_map(|direction| Light::Directional { direction });
     let beside_eye = (direction(), 0.0..20.0f64)
-        .prop_map(move |(d, digits)| camera.eye() + d * (camera.far() * 10f64.powf(-digits)));
+        .prop_map(move |(d, digits)| camera.eye() + d * (reach(&camera) * 10f64.powf(-digits)));
     let in_plane = ([0.0..1.0f64, 0.0..1.0], 0usize..6).prop_map(move |([u, v], plane)| {
         let [w, h] = camera.image().map(f64::from);
         let [left, right, top, bottom] = [[0.0, u], [1.0, u], [u, 0.0], [u, 1.0]];
         let ray = |[x, y]: [f64; 2]| camera.ray(glam::DVec2::new(x * w, y * h));
-        let depth = camera.far() * v;
+        let depth = camera.near() + (camera.far() - camera.near()) * v;
         camera.eye()
             + match plane {
-                0 => ray(left) * depth,
-                1 => ray(right) * depth,
-                2 => ray(top) * depth,
-                3 => ray(bottom) * depth,
-                4 => ray([u, v]) * camera.near(),
-                _ => ray([u, v]) * camera.far(),
+                0 => ray(left).at(depth),
+                1 => ray(right).at(depth),
+                2 => ray(top).at(depth),
+                3 => ray(bottom).at(depth),
+                4 => ray([u, v]).at(camera.near()),
+                _ => ray([u, v]).at(camera.far()),
             }
     });
     let place = prop_oneof![Just(camera.eye()), beside_eye, in_plane];
     let ends = prop_oneof![
         2 => (log_range(1e-6, 0.1), log_range(0.2, 10.0))
-            .prop_map(move |(near, range)| [near * camera.far(), range * camera.far()]),
+            .prop_map(move |(near, range)| [near, range].map(|share| share * reach(&camera))),
         1 => Just([1e-12, 1e12]),
     ];
     let half_deg = prop_oneof![1.0..90.0f64, Just(90.0)];
@@ -356,12 +370,30 @@ fn position_mut(light: &mut Light) -> Option<&mut DVec3> {
     }
 }
 
-/// A point of the view frustum: x and y across the image, z from near to far, denser near the
-/// viewer.
+/// A point of the view frustum: x and y across the image, z from near to far, in perspective views
+/// denser near the viewer.
 pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
     let [w, h] = camera.image().map(f64::from);
-    let depth = camera.near() * (camera.far() / camera.near()).powf(z);
-    camera.eye() + camera.ray(glam::DVec2::new(x * w, y * h)) * depth
+    let (near, far) = (camera.near(), camera.far());
+    let is_orthographic = camera.is_orthographic();
+    let depth = if is_orthographic { near + (far - near) * z } else { near * (far / near).powf(z) };
+    camera.eye() + camera.ray(glam::DVec2::new(x * w, y * h)).at(depth)
+}
+
+/// The smallest length that matters to a camera's maps, metres.
+pub(crate) fn detail(camera: &Camera) -> f64 {
+    let height = camera.pixel_width(camera.near()) * f64::from(camera.image()[1]);
+    if camera.is_orthographic() { height.min(camera.far() - camera.near()) } else { camera.near() }
+}
+
+/// The largest distance from the eye at which a camera sees anything, metres.
+pub(crate) fn reach(camera: &Camera) -> f64 {
+    let [w, h] = camera.image().map(f64::from);
+    [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]
+        .into_iter()
+        .flat_map(|(x, y)| [camera.near(), camera.far()].map(|z| (x, y, z)))
+        .map(|(x, y, z)| camera.ray(glam::DVec2::new(x, y)).at(z).length())
+        .fold(0.0, f64::max)
 }
 
 impl Config {
@@ -372,11 +404,15 @@ impl Config {
         let [w, h] = camera.image().map(f64::from);
         let corner = |x, y| camera.ray(glam::DVec2::new(x, y));
         let rays = [corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h)];
+        let middle = corner(w / 2.0, h / 2.0).at(camera.far());
         let mut planes: Vec<Plane> = (0..4)
             .map(|i| {
-                let n = rays[i].cross(rays[(i + 1) % 4]).normalize();
-                let inwards = if n.dot(camera.forward()) < 0.0 { -n } else { n };
-                Plane { normal: inwards, offset: 0.0 }
+                let [a, b] = [rays[i], rays[(i + 1) % 4]];
+                let across = b.at(1.0) - a.at(1.0);
+                let plane = Plane::through(a.start, a.direction.cross(across).normalize());
+                let is_inside = plane.distance(middle) >= 0.0;
+                let sign = if is_inside { 1.0 } else { -1.0 };
+                Plane { normal: plane.normal * sign, offset: plane.offset * sign }
             })
             .collect();
         planes.push(Plane { normal: camera.forward(), offset: -camera.near() });
@@ -403,7 +439,7 @@ impl Config {
     /// inside the others.
     pub(crate) fn corners(&self) -> Vec<DVec3> {
         let planes = self.half_spaces();
-        let slack = 1e-9 * self.camera.far();
+        let slack = 1e-9 * reach(&self.camera);
         let mut corners = Vec::new();
         for (i, a) in planes.iter().enumerate() {
             for (j, b) in planes[..i].iter().enumerate() {
@@ -425,7 +461,7 @@ impl Config {
     /// Whether the camera sees `world` in the light and within the bounds.
     pub(crate) fn sees(&self, world: DVec3) -> bool {
         let local = world - self.camera.eye();
-        let slack = 1e-12 * self.camera.far();
+        let slack = 1e-12 * reach(&self.camera);
         self.half_spaces().iter().all(|p| p.distance(local) >= -slack) && self.lights(world)
     }
 
@@ -516,8 +552,9 @@ pub(crate) fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
             PartialBox::Empty => Aabb::EMPTY,
             PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
             PartialBox::OutOfSight => {
-                let behind = camera.eye() - camera.forward() * 3.0 * camera.far();
-                Aabb::new(behind, behind + camera.far() * 0.1)
+                let size = reach(camera);
+                let behind = camera.eye() - camera.forward() * 3.0 * size;
+                Aabb::new(behind, behind + size * 0.1)
             }
         });
     }
@@ -557,7 +594,7 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
             let shadow = map.project(p).ok_or_else(|| nothing("behind the map", p))?;
             let error =
                 map.perspective_error(&config.camera, p).ok_or_else(|| nothing("no error", p))?;
-            let pixel = config.camera.depth(p) * config.camera.pixel_width_per_depth();
+            let pixel = config.camera.pixel_width(config.camera.depth(p));
             // Rounding in texels: its size in metres over a texel's width.
             let slack_s = 1e-7 + rounding / (error.s * pixel * res_s);
             let slack_t = 1e-7 + rounding / (error.t * pixel * res_t);
@@ -578,7 +615,7 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
                 check(is_most, kind, &|| format!("{error} > {largest} at {p}"))?;
             }
             let reach = match config.light {
-                Light::Directional { .. } => 10.0 * config.camera.far(),
+                Light::Directional { .. } => 10.0 * reach(&config.camera),
                 Light::Spot(spot) => 0.9 * p.distance(spot.position),
                 Light::Point(point) => 0.9 * p.distance(point.position),
             };

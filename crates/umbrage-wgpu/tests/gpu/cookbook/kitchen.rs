@@ -96,7 +96,8 @@ pub(crate) fn dark_on_dome(picture: &[[u8; 4]], camera: &Camera, to_sun: DVec3) 
     let (mut dark, mut all) = (0, 0);
     for y in 0..SIZE[1] {
         for x in 0..SIZE[0] {
-            let ray = camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)).normalize();
+            let sight = camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            let ray = sight.direction.normalize();
             let Some(t) = on_sphere(camera.eye(), ray) else { continue };
             let p = camera.eye() + ray * t;
             let normal = (p - DOME.0) / DOME.1;
@@ -145,7 +146,7 @@ pub(crate) fn ground_pixels(camera: &Camera) -> impl Iterator<Item = (DVec2, DVe
     (0..SIZE[1]).flat_map(move |y| {
         (0..SIZE[0]).filter_map(move |x| {
             let pixel = DVec2::new(f64::from(x), f64::from(y));
-            let ray = camera.ray(pixel + 0.5);
+            let ray = camera.ray(pixel + 0.5).direction;
             let t = -camera.eye().y / ray.y;
             let p = camera.eye() + ray * t;
             (t > 0.0 && p.length() < 15.0).then_some((pixel, p))
