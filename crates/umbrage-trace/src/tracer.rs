@@ -379,6 +379,25 @@ impl<'a> Tracer<'a> {
         corners(mesh, primitive.triangle)
     }
 
+    /// The triangles that a lamp lies in or beside: those [edge-on](Self::is_edge_on) to it whose
+    /// boxes are within a thousandth of the scene's size of it. In single precision such a triangle
+    /// may pass before the lamp, and then seems to hide everything.
+    pub fn edge_on_at(&self, lamp: DVec3) -> Vec<PrimitiveRef> {
+        let reach = self.bounds.size().length() / 1024.0;
+        let mut found = Vec::new();
+        for instance in self.instances.around(lamp, reach) {
+            let placement = &self.placements[instance as usize];
+            let local = placement.mesh_from_world * (lamp - placement.world_from_mesh.translation);
+            let reach = reach * stretch(placement.mesh_from_world);
+            let triangles = self.meshes[placement.mesh].boxes.around(local, reach);
+            let triangles =
+                triangles.into_iter().map(|triangle| PrimitiveRef { instance, triangle });
+            found.extend(triangles.filter(|&primitive| self.is_edge_on(primitive, lamp)));
+        }
+        found.sort_unstable();
+        found
+    }
+
     fn plane(&self, primitive: PrimitiveRef) -> TrianglePlane<'_> {
         let placement = &self.placements[primitive.instance as usize];
         TrianglePlane::new(placement, self.corners(primitive))
