@@ -14,7 +14,7 @@ use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
     write_exr, write_png,
 };
-use umbrage_trace::{View, shade};
+use umbrage_trace::{AreaLight, View, shade};
 
 /// All data from which a picture can be made. Fields that the requested picture does not need may
 /// stay empty.
@@ -52,6 +52,9 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let render_scene = RenderScene::new(&scene, &executors, args.scene.opaque)?;
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
+    if let Some(size) = args.light_size {
+        AreaLight::new(&view, size).context("--light-size")?;
+    }
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
     let seen = render_scene.seen(&receivers, &chosen.camera)?;
     let bounds = receivers.bounds(seen.as_ref());

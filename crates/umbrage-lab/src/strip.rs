@@ -264,6 +264,65 @@ mod tests {
     use umbrage_trace::Tracer;
 
     #[test]
+    fn perspective_errors_are_widths_of_texels_over_those_of_pixels() {
+        let scene = umbrage_scene::builtin("pole", None).unwrap();
+        let tracer = Tracer::new(&scene).unwrap();
+        let travel = DVec3::new(0.3, -1.0, 0.5);
+        let light = Light::Directional { direction: travel };
+        let (fov_y_rad, image) = (1.0, [48, 32]);
+        let look_at = LookAt {
+            eye: DVec3::new(-2.5, 3.4, 7.5),
+            target: DVec3::Y,
+            up: DVec3::Y,
+            fov_y_rad,
+            near: 0.1,
+            far: 100.0,
+            image,
+        };
+        let camera = Camera::look_at(look_at).unwrap();
+        let view = View::new(&tracer, camera, light, 1).unwrap();
+        let bounds = umbrage::Bounds::of_scene(scene.bounds());
+        let technique = umbrage::Technique::default();
+        let mut planner = umbrage::Planner::new();
+        let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
+        let rows = Rows::new(&view, 0..image[1], &|_| {});
+        let truth = rows.truth();
+        let found: Vec<f32> = rows.perspective_errors(&truth, plan).collect();
+        assert_eq!(found.len(), (image[0] * image[1]) as usize);
+        let map = &plan.maps[0];
+        let texel =
+            |p| map.project(p).unwrap().truncate() * glam::UVec2::from(map.resolution).as_dvec2();
+        let mut counted = 0;
+        for (y, x) in (0..image[1]).flat_map(|y| (0..image[0]).map(move |x| (y, x))) {
+            let Some(sample) = view.sample(glam::dvec2(f64::from(x) + 0.5, f64::from(y) + 0.5))
+            else {
+                continue;
+            };
+            let found = f64::from(found[(y * image[0] + x) as usize]);
+            if !view.counts(sample.is_facing, sample.depth) {
+                assert!(found.is_nan());
+                continue;
+            }
+            // The most metres that a texel spans in any direction across the light.
+            let (u, v) = travel.normalize().any_orthonormal_pair();
+            let at = sample.surface.position;
+            let step = 1e-4;
+            let per_metre =
+                |way: DVec3| (texel(at + way * step) - texel(at - way * step)) / (2.0 * step);
+            let [a, b] = [per_metre(u), per_metre(v)];
+            let least = (0..3600)
+                .map(|i| glam::DVec2::from_angle(f64::from(i) * std::f64::consts::PI / 3600.0))
+                .map(|way| (a * way.x + b * way.y).length())
+                .fold(f64::INFINITY, f64::min);
+            let pixel = sample.depth * 2.0 * (fov_y_rad / 2.0).tan() / f64::from(image[1]);
+            let expected = 1.0 / least / pixel;
+            assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+            counted += 1;
+        }
+        assert!(counted > 300, "{counted} pixels count");
+    }
+
+    #[test]
     fn pixels_average_their_counted_samples() {
         let scene = umbrage_scene::builtin("sphere", Some(32)).unwrap();
         let tracer = Tracer::new(&scene).unwrap();

@@ -11,24 +11,28 @@ use umbrage::visibility::LightSize;
 const RIM: u32 = 12;
 
 /// Cells along each side of the grid of the first look, with two rays in each.
-const FIRST: u32 = 3;
+const FIRST: u32 = 4;
 
-/// Cells along each side of the grids that are tried in turn until one is fine enough. An edge
-/// through the light needs the first one. The last one suffices for any light, since the standard
-/// error of random rays is 0.5 divided by the square root of their number.
-const GRIDS: [u32; 3] = [24, 48, 96];
+/// Cells along each side of the grids that follow. One of them suffices where a single edge crosses
+/// the light.
+const CELLS: u32 = 20;
+
+/// The largest number of grids. Fewer than that suffice for any light, since the standard error of
+/// random rays is at most 0.5 divided by the square root of their number.
+const MOST_GRIDS: u32 = 24;
 
 /// The light of a view with a size: a sun is a disc in the sky, and a lamp is a sphere around its
 /// position.
 ///
 /// [`visibility`](Self::visibility) is found by many rays. A first look at the rim and at some points
 /// within decides whether the light is wholly visible or wholly hidden, in which case no further
-/// rays are cast. What hides less than about a fiftieth of the light can escape the first look if it
+/// rays are cast. What hides less than about a twentieth of the light can escape the first look if it
 /// is thin, such as a wire.
 ///
 /// Otherwise two points are chosen at random in each cell of a grid over the light, and the
-/// differences between the two tell the standard error. The grid is refined until that is at most [`STANDARD_ERROR`](Self::STANDARD_ERROR). The same point of a surface
-/// always gets the same rays, and different points get different ones.
+/// differences between the two tell the standard error. Further grids follow until that of their
+/// mean is at most [`STANDARD_ERROR`](Self::STANDARD_ERROR). The same point of a surface always gets
+/// the same rays, and different points get different ones.
 pub struct AreaLight<'v, 'a> {
     view: &'v View<'a>,
     /// A lamp's radius in metres; the tangent of half the angle that a sun subtends.
@@ -91,19 +95,20 @@ impl<'v, 'a> AreaLight<'v, 'a> {
         if within.mean == 0.0 && rim == 0.0 || within.mean == 1.0 && rim == f64::from(RIM) {
             return AreaVisibility { rays, ..known(within.mean as f32) };
         }
-        let mut grid = within;
-        for cells in GRIDS {
-            grid = Grid::sample(cells, &mut random, &mut look);
-            rays += Grid::rays(cells);
-            if grid.standard_error <= Self::STANDARD_ERROR {
-                break;
+        let (mut sum, mut variances, mut grids) = (0.0, 0.0f64, 0);
+        let standard_error = loop {
+            let Grid { mean, variance } = Grid::sample(CELLS, &mut random, &mut look);
+            sum += mean;
+            variances += variance;
+            grids += 1;
+            rays += Grid::rays(CELLS);
+            let standard_error = variances.sqrt() / f64::from(grids);
+            if standard_error <= Self::STANDARD_ERROR || grids == MOST_GRIDS {
+                break standard_error;
             }
-        }
-        AreaVisibility {
-            visibility: grid.mean as f32,
-            standard_error: grid.standard_error as f32,
-            rays,
-        }
+        };
+        let visibility = (sum / f64::from(grids)) as f32;
+        AreaVisibility { visibility, standard_error: standard_error as f32, rays }
     }
 
     /// The light's disc; `None` inside a lamp.
@@ -135,7 +140,8 @@ impl<'v, 'a> AreaLight<'v, 'a> {
 /// What rays through a grid of cells found.
 struct Grid {
     mean: f64,
-    standard_error: f64,
+    /// Estimate of the variance of `mean`.
+    variance: f64,
 }
 
 impl Grid {
@@ -161,7 +167,7 @@ impl Grid {
             squares += (a - b) * (a - b);
         }
         let n = f64::from(cells * cells);
-        Self { mean: sum / (2.0 * n), standard_error: (0.25 * squares).sqrt() / n }
+        Self { mean: sum / (2.0 * n), variance: 0.25 * squares / (n * n) }
     }
 }
 

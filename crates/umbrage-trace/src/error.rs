@@ -26,7 +26,7 @@ pub enum Error {
         max: u32,
     },
     /// The size of an area light is not one that this kind of light can have.
-    #[error("light size: {problem}")]
+    #[error("{problem}")]
     LightSize {
         /// What is wrong and what would be right.
         problem: String,

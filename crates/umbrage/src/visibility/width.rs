@@ -91,7 +91,7 @@ impl LightSize {
             (Light::Spot(_) | Light::Point(_), Self::Degrees(_)) => {
                 "a lamp's size is a length, as in 0.2m"
             }
-            _ => return self.check_range(),
+            _ => return self.check_range().map_err(|p| format!("a light's size {p}")),
         };
         Err(problem.to_owned())
     }
