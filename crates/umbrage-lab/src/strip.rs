@@ -1,10 +1,13 @@
 //! Some rows of a picture with values for each sample, computed by a GPU or the CPU.
 
+use crate::error::{About, Error, Field};
 use glam::Vec3;
 use std::cell::OnceCell;
 use std::ops::Range;
+use umbrage::visibility::LightSize;
 use umbrage::{Camera, Plan};
-use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
+use umbrage_measure::AreaTruth;
+use umbrage_trace::{AreaLight, AreaVisibility, Band, Progress, Reference, Sample, View, shade};
 
 /// Message about a picture without counted pixels.
 pub const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
@@ -46,6 +49,45 @@ impl<'a> Rows<'a> {
         Strip::new(self.view, band, band.map(|s| self.view.truth(s), self.progress))
     }
 
+    /// Returns the rows with the ray-traced soft shadows of a light of this size, and how certain
+    /// they are.
+    ///
+    /// # Errors
+    /// An error if the light cannot have this size.
+    pub fn area_truth(&self, size: LightSize) -> Result<(Strip, Certainty), Error> {
+        let area = AreaLight::new(self.view, size).about(Field::LightSize)?;
+        let band = self.band();
+        let seen = band.map(|s| area.visibility(s), self.progress);
+        let strip = Strip::new(self.view, band, seen.iter().map(|v| v.visibility).collect());
+        let certainty = Certainty::of_pixels(&seen, band.samples_per_pixel());
+        Ok((strip, certainty))
+    }
+
+    /// Returns the mean cosine between surface and light of each pixel of `truth`, which must be that
+    /// of these rows, over the samples that count; 0 without any.
+    pub(crate) fn cosines(&self, truth: &Strip) -> impl Iterator<Item = f32> {
+        let cosine = |s: &Sample| shade::incidence(self.view.light(), &s.surface);
+        let cosines = self.band().map(cosine, &|_| {});
+        truth.means(move |i| cosines[i]).map(|mean| mean.unwrap_or(0.0))
+    }
+
+    /// Returns the mean perspective error of each pixel of `truth`, which must be that of these rows,
+    /// over the samples that count, pixels per texel; NaN if none counts or if no map of the plan
+    /// serves one that counts.
+    pub(crate) fn perspective_errors(
+        &self,
+        truth: &Strip,
+        plan: &Plan,
+    ) -> impl Iterator<Item = f32> {
+        let error = |s: &Sample| {
+            let position = s.surface.position;
+            let (map, _) = plan.lookup(0, position).max_by(|a, b| a.1.total_cmp(&b.1))?;
+            plan.maps[map].perspective_error(self.view.camera(), position)
+        };
+        let errors = self.band().map(|s| error(s).map(|e| e.worst as f32), &|_| {});
+        truth.means(move |i| errors[i].unwrap_or(f32::NAN)).map(|mean| mean.unwrap_or(f32::NAN))
+    }
+
     /// Returns the rows without shadows, as if nothing cast any.
     pub fn in_full_light(&self) -> Strip {
         let band = self.band();
@@ -58,6 +100,48 @@ impl<'a> Rows<'a> {
         let visibility = band.map(|s| reference.visibility(0, s), self.progress);
         let lookup = |s: &Sample| Lookup::of(plan, reference, self.view.camera(), s);
         Strip { lookups: band.map(lookup, &|_| {}), ..Strip::new(self.view, band, visibility) }
+    }
+}
+
+/// How certain the truth of an area light is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Certainty {
+    /// Number of pixels.
+    pub pixels: u64,
+    /// Number of shadow rays.
+    pub rays: u64,
+    /// The largest standard error of a pixel's visibility.
+    pub standard_error: f64,
+}
+
+impl Certainty {
+    /// The certainty of pixels with `n` samples each.
+    fn of_pixels(seen: &[AreaVisibility], n: usize) -> Self {
+        let standard_error = |pixel: &[AreaVisibility]| {
+            let variances = pixel.iter().map(|v| f64::from(v.standard_error).powi(2));
+            variances.sum::<f64>().sqrt() / n as f64
+        };
+        Self {
+            pixels: (seen.len() / n) as u64,
+            rays: seen.iter().map(|v| u64::from(v.rays)).sum(),
+            standard_error: seen.chunks(n).map(standard_error).fold(0.0, f64::max),
+        }
+    }
+
+    /// Returns the certainty in the form that reports show, for a light of this size.
+    pub(crate) fn of_light(self, size: LightSize) -> AreaTruth {
+        AreaTruth {
+            light_size: size.to_string(),
+            standard_error: self.standard_error,
+            shadow_rays_per_pixel: self.rays as f64 / self.pixels as f64,
+        }
+    }
+
+    /// Adds the certainty of other pixels.
+    pub fn add(&mut self, other: Self) {
+        self.pixels += other.pixels;
+        self.rays += other.rays;
+        self.standard_error = self.standard_error.max(other.standard_error);
     }
 }
 
@@ -178,6 +262,65 @@ mod tests {
     use glam::DVec3;
     use umbrage::{Light, LookAt};
     use umbrage_trace::Tracer;
+
+    #[test]
+    fn perspective_errors_are_widths_of_texels_over_those_of_pixels() {
+        let scene = umbrage_scene::builtin("pole", None).unwrap();
+        let tracer = Tracer::new(&scene).unwrap();
+        let travel = DVec3::new(0.3, -1.0, 0.5);
+        let light = Light::Directional { direction: travel };
+        let (fov_y_rad, image) = (1.0, [48, 32]);
+        let look_at = LookAt {
+            eye: DVec3::new(-2.5, 3.4, 7.5),
+            target: DVec3::Y,
+            up: DVec3::Y,
+            fov_y_rad,
+            near: 0.1,
+            far: 100.0,
+            image,
+        };
+        let camera = Camera::look_at(look_at).unwrap();
+        let view = View::new(&tracer, camera, light, 1).unwrap();
+        let bounds = umbrage::Bounds::of_scene(scene.bounds());
+        let technique = umbrage::Technique::default();
+        let mut planner = umbrage::Planner::new();
+        let plan = planner.plan(&camera, &[light], &bounds, &technique).unwrap();
+        let rows = Rows::new(&view, 0..image[1], &|_| {});
+        let truth = rows.truth();
+        let found: Vec<f32> = rows.perspective_errors(&truth, plan).collect();
+        assert_eq!(found.len(), (image[0] * image[1]) as usize);
+        let map = &plan.maps[0];
+        let texel =
+            |p| map.project(p).unwrap().truncate() * glam::UVec2::from(map.resolution).as_dvec2();
+        let mut counted = 0;
+        for (y, x) in (0..image[1]).flat_map(|y| (0..image[0]).map(move |x| (y, x))) {
+            let Some(sample) = view.sample(glam::dvec2(f64::from(x) + 0.5, f64::from(y) + 0.5))
+            else {
+                continue;
+            };
+            let found = f64::from(found[(y * image[0] + x) as usize]);
+            if !view.counts(sample.is_facing, sample.depth) {
+                assert!(found.is_nan());
+                continue;
+            }
+            // The most metres that a texel spans in any direction across the light.
+            let (u, v) = travel.normalize().any_orthonormal_pair();
+            let at = sample.surface.position;
+            let step = 1e-4;
+            let per_metre =
+                |way: DVec3| (texel(at + way * step) - texel(at - way * step)) / (2.0 * step);
+            let [a, b] = [per_metre(u), per_metre(v)];
+            let least = (0..3600)
+                .map(|i| glam::DVec2::from_angle(f64::from(i) * std::f64::consts::PI / 3600.0))
+                .map(|way| (a * way.x + b * way.y).length())
+                .fold(f64::INFINITY, f64::min);
+            let pixel = sample.depth * 2.0 * (fov_y_rad / 2.0).tan() / f64::from(image[1]);
+            let expected = 1.0 / least / pixel;
+            assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+            counted += 1;
+        }
+        assert!(counted > 300, "{counted} pixels count");
+    }
 
     #[test]
     fn pixels_average_their_counted_samples() {

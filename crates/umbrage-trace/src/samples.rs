@@ -1,5 +1,5 @@
 use crate::{Error, Progress, Ray, Surface, Tracer};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 use std::ops::Range;
 use umbrage::{Camera, Light};
@@ -35,7 +35,7 @@ pub struct Sample {
     /// Whether the visible side of the triangle faces the light and lies within the light's reach
     /// (a spot or point light's range, a spot light's cone). If not, the sample is dark whatever
     /// any shadow map says. The geometric normal decides, because triangles are what casts and
-    /// receives shadows.
+    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp does not face it.
     pub is_facing: bool,
 }
 
@@ -117,7 +117,7 @@ impl<'a> View<'a> {
         let ray = Ray::of_view(&self.camera, pixel);
         let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
         let surface = self.tracer.surface(&hit, ray.direction);
-        let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
+        let is_facing = self.is_facing(&surface);
         // The ray's parameter t is the depth.
         Some(Sample { surface, depth: hit.t, is_facing })
     }
@@ -141,11 +141,17 @@ impl<'a> View<'a> {
             && is_towards
             && end >= 0.0
             && !self.tracer.occluded_from(surface, to_eye, end);
-        is_seen.then(|| Sample {
-            surface: *surface,
-            depth,
-            is_facing: is_facing(&self.light, surface.position, surface.geometric_normal),
-        })
+        is_seen.then(|| Sample { surface: *surface, depth, is_facing: self.is_facing(surface) })
+    }
+
+    fn is_facing(&self, surface: &Surface) -> bool {
+        let Surface { position, geometric_normal: normal, primitive, .. } = *surface;
+        let to_light = self.light.direction_to_light(position);
+        // Whether a plane that holds the lamp faces it would depend on the last bit of each point.
+        let is_edge_on = |lamp| self.tracer.is_edge_on(primitive, lamp);
+        normal.dot(to_light) > 0.0
+            && self.light.reaches(position)
+            && !self.light.position().is_some_and(is_edge_on)
     }
 
     /// Whether the shadow on a surface counts where pictures are compared: it [faces the
@@ -164,14 +170,16 @@ impl<'a> View<'a> {
         if !sample.is_facing {
             return 0.0;
         }
-        let position = sample.surface.position;
-        let (direction, end) = match self.light {
-            Light::Directional { direction } => (-direction, f64::INFINITY),
-            _ if !self.light.casts_at(position) => return 1.0,
-            Light::Spot(spot) => (spot.position - position, 1.0),
-            Light::Point(point) => (point.position - position, 1.0),
+        if !self.light.casts_at(sample.surface.position) {
+            return 1.0;
+        }
+        let is_dark = match self.light.position() {
+            Some(lamp) => self.tracer.hidden_from_lamp(&sample.surface, lamp),
+            None => {
+                let to_sun = self.light.direction_to_light(sample.surface.position);
+                self.tracer.occluded_from(&sample.surface, to_sun, f64::INFINITY)
+            }
         };
-        let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
         f32::from(u8::from(!is_dark))
     }
 }
@@ -211,8 +219,4 @@ impl Band {
             })
             .collect()
     }
-}
-
-fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
-    normal.dot(light.direction_to_light(position)) > 0.0 && light.reaches(position)
 }

@@ -121,6 +121,15 @@ impl Light {
         }
     }
 
+    /// Position of a spot or point light in world space, metres; `None` for a directional light.
+    pub fn position(&self) -> Option<DVec3> {
+        match self {
+            Self::Directional { .. } => None,
+            Self::Spot(spot) => Some(spot.position),
+            Self::Point(point) => Some(point.position),
+        }
+    }
+
     /// The sides of the cube through which the light's maps look, one for each projector; `None`
     /// for the projector of a light without a cube.
     pub(crate) fn sides(&self) -> &'static [Option<CubeSide>] {

@@ -96,7 +96,7 @@ fn shared_options() {
         ),
         (
             &["--shadows", "lispsm:pcss(light=3)"],
-            "`light=3` must have a unit, as in `light=0.53deg` or `light=0.2m`",
+            "`light=3` must have a unit, as in `0.53deg` or `0.2m`",
         ),
         (&["--shadows", "lispsm:pcss(light=-1m)"], "`light=-1m` must be above 0 and at most"),
         (&["--shadows", "lispsm:pcss(samples=9)"], "from 1 to 8"),
@@ -128,6 +128,19 @@ fn options_of_some_commands() {
     for (args, expected) in [
         (&["render"][..], "<SCENE>"),
         (&["render", "pole"], "--output"),
+        (
+            &["render", "pole", "-o", "a.png", "--light-size", "1deg"],
+            "--light-size: only --aov truth and --aov difference show the truth",
+        ),
+        (
+            &["render", "pole", "-o", "a.png", "--aov", "truth", "--light-size", "0.2m"],
+            "--light-size: a sun's size is an angle, as in 0.53deg",
+        ),
+        (
+            &["compare", "lantern", "-o", "out", "--light-size", "1deg"],
+            "--light-size: a lamp's size is a length, as in 0.2m",
+        ),
+        (&["compare", "pole", "-o", "out", "--light-size", "3"], "must have a unit"),
         (&["compare", "pole"], "--output"),
         (&["rendr", "pole"], "'rendr'"),
         (&["scenes", "pole"], "'pole'"),

@@ -43,12 +43,15 @@ fn the_report_has_all_that_is_documented() {
         assert_eq!(result["backend"], "gpu");
         assert!(!result["device"].as_str().unwrap().is_empty());
         assert_eq!(result["maps"], 1);
-        for figure in ["wrong_fraction", "mean_abs_error", "flip", "storage_factor"] {
+        for figure in ["wrong_fraction", "mean_abs_error", "light_error", "flip", "storage_factor"]
+        {
             assert!(result[figure].as_f64().unwrap() >= 0.0, "{figure}");
         }
-        let [p50, p95, max] =
-            ["p50", "p95", "max"].map(|p| result["error_px"][p].as_f64().unwrap());
-        assert!(0.0 < p50 && p50 <= p95 && p95 <= max, "{result}");
+        assert!(result.get("truth").is_none(), "there is only one truth");
+        for error in ["error_px", "perspective_px"] {
+            let [p50, p95, max] = ["p50", "p95", "max"].map(|p| result[error][p].as_f64().unwrap());
+            assert!(0.0 < p50 && p50 <= p95 && p95 <= max, "{error}: {result}");
+        }
         assert_eq!(keys(&result["ms"]), ["depth", "filter", "plan", "shade"]);
         for stage in ["plan", "depth", "shade"] {
             assert!(result["ms"][stage].as_f64().unwrap() > 0.0, "{stage}");
@@ -98,6 +101,36 @@ fn the_figures_are_those_of_the_pictures() {
         &[&["render", "-o", "t.png", "--aov", "truth", "--samples", "1"], &view[..]].concat(),
     );
     assert_eq!(luma("t.png"), truth);
+}
+
+#[test]
+fn soft_techniques_are_measured_against_a_light_with_a_size() {
+    let desk = Desk::new();
+    let view = ["pole", "--size", "96x54", "--backend", "reference", "--json"];
+    let techniques = ["--shadows", "adaptive@512", "--shadows", "adaptive:pcss(light=6deg)@512"];
+    let compare = |folder: &str, more: &[&str]| {
+        desk.json(&[&["compare", "-o", folder], &view[..], &techniques, more].concat())
+    };
+    let hard = compare("hard", &[]);
+    let soft = compare("soft", &["--light-size", "6deg"]);
+    let truth = &soft["truth"];
+    assert_eq!(truth["light_size"], "6deg");
+    let error = truth["standard_error"].as_f64().unwrap();
+    assert!(0.0 < error && error < 1.0 / 255.0, "{error}");
+    assert!(truth["shadow_rays_per_pixel"].as_f64().unwrap() > 10.0);
+    assert_eq!([&soft["results"][0]["truth"], &soft["results"][1]["truth"]], ["point", "area"]);
+    let mean = |json: &Value, i: usize| json["results"][i]["light_error"].as_f64().unwrap();
+    assert_eq!(mean(&hard, 0), mean(&soft, 0), "a hard technique has the same truth as ever");
+    // Softness is no error any more.
+    assert!(mean(&soft, 1) < 0.5 * mean(&hard, 1), "{} {}", mean(&soft, 1), mean(&hard, 1));
+    // The page shows the soft truth, which is that of `render`.
+    let render = ["render", "pole", "-o", "t.png", "--aov", "truth", "--samples", "1"];
+    desk.succeed(&[&render[..], &["--size", "96x54", "--light-size", "6deg"]].concat());
+    let luma = |path: &str| image::open(desk.path(path)).unwrap().to_luma8();
+    let truth = luma("soft/truth-visibility.png");
+    assert_eq!(luma("t.png"), truth);
+    let between = truth.pixels().filter(|p| (20..236).contains(&p.0[0])).count();
+    assert!(between > 20, "{between} pixels in the penumbra");
 }
 
 #[test]

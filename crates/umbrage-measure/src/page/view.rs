@@ -4,7 +4,7 @@ use super::Page;
 use super::chart::{self, Line, Tick};
 use super::numbers::{count, duration_ms, percent, plain, significant, vector};
 use super::table::{self, Cell, Column};
-use crate::{Error, LightInfo, Measured, Pictures, Report};
+use crate::{AreaTruth, Error, LightInfo, Measured, Pictures, Report, Truth};
 use askama::Template;
 use serde::Serialize;
 
@@ -209,11 +209,18 @@ fn counted(report: &Report) -> String {
 }
 
 fn truth_how(report: &Report) -> String {
-    let rays = rays_a_pixel(report.truth.rays_per_pixel);
-    match report.truth.seconds {
-        Some(s) => format!("{rays}, in {}", duration_ms(s * 1e3)),
-        None => rays,
+    let Truth { rays_per_pixel, seconds, area } = &report.truth;
+    let mut how = rays_a_pixel(*rays_per_pixel);
+    if let Some(AreaTruth { light_size, standard_error, shadow_rays_per_pixel }) = area {
+        how += &format!(
+            "; for soft techniques a light of {light_size}, {shadow_rays_per_pixel:.0} shadow rays \
+             per pixel, standard error at most {standard_error:.4}"
+        );
     }
+    if let Some(seconds) = seconds {
+        how += &format!(", in {}", duration_ms(seconds * 1e3));
+    }
+    how
 }
 
 pub(super) fn rays_a_pixel(n: u32) -> String {
@@ -433,6 +440,18 @@ mod tests {
             "Light: “flame”, spot at (0, 2.35, −1) m; shines: (0, −1, 0), 30° to each side; \
              reaches: 12.5 m"
         );
+    }
+
+    #[test]
+    fn a_second_truth_is_told_of() {
+        let mut report = report(&[Some(0.5)]);
+        assert_eq!(truth_how(&report), "16 rays per pixel, in 1.25 s");
+        let light_size = "0.53deg".to_owned();
+        report.truth.area =
+            Some(AreaTruth { light_size, standard_error: 0.0037, shadow_rays_per_pixel: 123.5 });
+        let how = truth_how(&report);
+        assert!(how.contains("; for soft techniques a light of 0.53deg, 124 shadow rays"), "{how}");
+        assert!(how.ends_with("standard error at most 0.0037, in 1.25 s"), "{how}");
     }
 
     #[test]

@@ -120,8 +120,15 @@ fn base_color(in: Fragment) -> vec4f {
     return material.base_color * texel;
 }
 
+// About how far single precision may turn the normal that comes from positions in neighbouring
+// pixels, radians.
+fn normal_error(in: Fragment) -> f32 {
+    let step = min(length(dpdx(in.position)), length(dpdy(in.position)));
+    return exp2(-24.0) * length(in.position) / max(step, 1e-30);
+}
+
 fn opaque_surface(in: Fragment) -> Surface {
-    return surface(in, triangle_normal(in), base_color(in).rgb);
+    return surface(in, triangle_normal(in), normal_error(in), base_color(in).rgb);
 }
 
 // A fragment stage that discards keeps the device from testing depth before it shades, so only
@@ -129,20 +136,21 @@ fn opaque_surface(in: Fragment) -> Surface {
 fn masked_surface(in: Fragment) -> Surface {
     // Derivatives are taken first, before parts of a quad are discarded.
     let normal = triangle_normal(in);
+    let normal_error = normal_error(in);
     let color = base_color(in);
     if (color.a < material.cutoff) {
         discard;
     }
-    return surface(in, normal, color.rgb);
+    return surface(in, normal, normal_error, color.rgb);
 }
 
-fn surface(in: Fragment, normal: vec3f, color: vec3f) -> Surface {
+fn surface(in: Fragment, normal: vec3f, normal_error: f32, color: vec3f) -> Surface {
     var shading_normal = normalize_or_zero(in.normal);
     if (all(shading_normal == vec3f(0.0))) {
         shading_normal = normal;
     }
     shading_normal = select(shading_normal, -shading_normal, dot(shading_normal, normal) < 0.0);
-    let is_facing = faces_light(in.position, normal);
+    let is_facing = faces_light(in.position, normal, normal_error);
     var visibility = 0.0;
     if (is_facing) {
         visibility = shadow_visibility(view.light_index, in.position, normal);
@@ -157,10 +165,12 @@ fn to_light(position: vec3f) -> vec3f {
     return normalize_or_zero(view.light_position - position);
 }
 
-// Whether the light reaches a surface if nothing lies between them.
-fn faces_light(position: vec3f, normal: vec3f) -> bool {
+// Whether the light reaches a surface if nothing lies between them. A surface that is edge-on to the
+// light as far as single precision can tell does not face it, for whether it does would change from
+// pixel to pixel.
+fn faces_light(position: vec3f, normal: vec3f, normal_error: f32) -> bool {
     let light = to_light(position);
-    if (dot(normal, light) <= 0.0) {
+    if (dot(normal, light) <= normal_error) {
         return false;
     }
     if (view.light_kind == DIRECTIONAL) {
