@@ -46,6 +46,31 @@ impl<'a> Budget<'a> {
         Ok(())
     }
 
+    /// Makes room for `more` things in a list, whose memory is taken while it grows. It grows by
+    /// half or more, if that fits.
+    ///
+    /// # Errors
+    /// [`SceneError::TooLarge`] if the list does not fit.
+    pub(super) fn grow<T>(
+        &self,
+        place: &str,
+        list: &mut Vec<T>,
+        more: u64,
+        what: &str,
+    ) -> Result<(), SceneError> {
+        let (old, needed) = (list.capacity() as u64, (list.len() as u64).saturating_add(more));
+        if needed <= old {
+            return Ok(());
+        }
+        let roomy = needed.max(old + old / 2);
+        // The old memory is given back when all has moved to the new.
+        let take = |capacity| self.take(place, capacity, what, size_of::<T>()).map(|()| capacity);
+        let capacity = take(roomy).or_else(|_| take(needed))?;
+        list.reserve_exact(capacity as usize - list.len());
+        self.taken.set(self.taken.get() - old * size_of::<T>() as u64);
+        Ok(())
+    }
+
     /// How much is taken, bytes.
     pub(super) fn taken(&self) -> u64 {
         self.taken.get()

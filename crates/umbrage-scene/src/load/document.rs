@@ -75,6 +75,7 @@ impl<'a> Document<'a> {
         // the largest kind.
         let objects = json.iter().filter(|&&b| b == b'{').count() as u64;
         budget.take("JSON", objects, "objects", size_of::<Node>())?;
+        budget.take("JSON", json.len() as u64, "characters", 1)?;
         let root: Root = gltf::json::deserialize::from_slice(json)
             .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
         let buffers = Vec::new();

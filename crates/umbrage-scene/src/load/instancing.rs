@@ -2,71 +2,71 @@
 
 use super::document::Document;
 use crate::error::SceneError;
-use crate::types::Instance;
 use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;
 use gltf::json::{Accessor, Index, Node};
+
+const NAME: &str = "EXT_mesh_gpu_instancing";
 
 /// Where the copies of a node's mesh are.
 pub(super) struct Copies {
     /// Place of the extension, for errors.
     place: String,
-    len: usize,
-    /// Each has `len` elements.
+    /// All that there are have the same number of elements.
     translations: Option<Vec<[f32; 3]>>,
     rotations: Option<Vec<[f32; 4]>>,
     scales: Option<Vec<[f32; 3]>>,
 }
 
+/// The accessors of a node's copies.
+struct Accessors {
+    translation: Option<Index<Accessor>>,
+    rotation: Option<Index<Accessor>>,
+    scale: Option<Index<Accessor>>,
+}
+
 impl Copies {
-    /// The copies of a node's mesh; `None` if it is drawn once. The memory of `instances` instances
-    /// for each copy is taken from the budget before anything is read.
+    /// How many copies a node draws; `None` if it draws its mesh once, where it is. That is also the
+    /// case if the extension has only custom attributes, so that all copies coincide.
     ///
     /// # Errors
-    /// An attribute is no accessor's index, or the accessor is invalid, or there are too many
-    /// instances.
-    pub(super) fn of(
+    /// An attribute is no accessor's index.
+    pub(super) fn count(
         document: &Document,
         node: &Node,
         place: &str,
-        instances: usize,
-    ) -> Result<Option<Self>, SceneError> {
-        const NAME: &str = "EXT_mesh_gpu_instancing";
-        let extension = node.extensions.as_ref().and_then(|e| e.others.get(NAME));
-        let Some(attributes) = extension.map(|e| &e["attributes"]) else { return Ok(None) };
-        let place = format!("{place}.extensions.{NAME}");
-        let id = |name: &str| accessor(document, attributes, name, &place);
-        let [translation, rotation, scale] = [id("TRANSLATION")?, id("ROTATION")?, id("SCALE")?];
-        let Some(any) = translation.or(rotation).or(scale) else {
-            // The extension has only custom attributes, so all of its copies coincide with the
-            // node.
-            return Ok(None);
-        };
-        let len = document.get(any, &place)?.count.0;
-        let count = len.saturating_mul(instances as u64);
-        document.budget.take(&place, count, "instances", size_of::<Instance>())?;
-        let vectors = |id: Option<_>| id.map(|i| document.floats::<3>(i, &place)).transpose();
-        let copies = Self {
-            len: len as usize,
-            translations: vectors(translation)?,
-            rotations: rotation.map(|i| document.floats::<4>(i, &place)).transpose()?,
-            scales: vectors(scale)?,
-            place,
-        };
-        let lengths = [
-            copies.translations.as_ref().map(Vec::len),
-            copies.rotations.as_ref().map(Vec::len),
-            copies.scales.as_ref().map(Vec::len),
-        ];
-        if lengths.into_iter().flatten().any(|other| other != copies.len) {
-            let problem = "its attributes have different numbers of elements";
-            return Err(document.invalid(&copies.place, problem));
-        }
-        Ok(Some(copies))
+    ) -> Result<Option<u64>, SceneError> {
+        let Accessors { translation, rotation, scale } = accessors(document, node, place)?;
+        let any = translation.or(rotation).or(scale);
+        any.map(|id| Ok(document.get(id, place)?.count.0)).transpose()
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.len
+    /// The copies of a node, of which there are `len`.
+    ///
+    /// # Errors
+    /// An accessor is invalid, has another length or is too large.
+    pub(super) fn load(
+        document: &Document,
+        node: &Node,
+        place: &str,
+        len: usize,
+    ) -> Result<Self, SceneError> {
+        let Accessors { translation, rotation, scale } = accessors(document, node, place)?;
+        let place = format!("{place}.extensions.{NAME}");
+        let vectors = |id: Option<_>| id.map(|i| document.floats::<3>(i, &place)).transpose();
+        let translations = vectors(translation)?;
+        let rotations = rotation.map(|i| document.floats::<4>(i, &place)).transpose()?;
+        let scales = vectors(scale)?;
+        let lengths = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ];
+        if lengths.into_iter().flatten().any(|other| other != len) {
+            let problem = "its attributes have different numbers of elements";
+            return Err(document.invalid(&place, problem));
+        }
+        Ok(Self { place, translations, rotations, scales })
     }
 
     /// The transform of copy `i` to the node's space.
@@ -99,17 +99,20 @@ impl Copies {
     }
 }
 
-/// The accessor of an attribute; `None` if there is no such attribute.
-fn accessor(
-    document: &Document,
-    attributes: &Value,
-    name: &str,
-    place: &str,
-) -> Result<Option<Index<Accessor>>, SceneError> {
-    let value = &attributes[name];
-    let index = value.as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new);
-    if index.is_none() && !value.is_null() {
-        return Err(document.invalid(place, format!("{name} must be an accessor's index")));
-    }
-    Ok(index)
+fn accessors(document: &Document, node: &Node, place: &str) -> Result<Accessors, SceneError> {
+    let extension = node.extensions.as_ref().and_then(|e| e.others.get(NAME));
+    let id = |name: &str| {
+        let value = extension.map_or(&Value::Null, |e| &e["attributes"][name]);
+        let index = value.as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new);
+        if index.is_none() && !value.is_null() {
+            let place = format!("{place}.extensions.{NAME}");
+            return Err(document.invalid(&place, format!("{name} must be an accessor's index")));
+        }
+        Ok(index)
+    };
+    Ok(Accessors {
+        translation: id("TRANSLATION")?,
+        rotation: id("ROTATION")?,
+        scale: id("SCALE")?,
+    })
 }

@@ -72,9 +72,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 }
 
 /// Like [`load`], with another limit of the memory that the scene may take, bytes. All count
-/// together: the files, what is read from them for a while, and the scene's vertices, triangles,
-/// instances and pixels. Lists that grow while they are filled may take up to three times as much
-/// for a moment.
+/// together: the files, their JSON, what is read from them for a while, and the scene's vertices,
+/// triangles, instances and pixels. What cannot become large without these is not counted.
 ///
 /// # Errors
 /// As for [`load`].
@@ -157,15 +156,17 @@ impl Loader<'_> {
         if let Some(skin) = node.skin {
             let taken = document.budget.taken();
             let joints = skin::joint_matrices(document, skin, hierarchy, &mut self.notices)?;
-            if Copies::of(document, node, &place, 0)?.is_some() {
+            document.budget.give_back_to(taken);
+            if Copies::count(document, node, &place)?.is_some() {
                 self.notices
                     .add(&place, "instances of a skinned mesh are not supported, drawn once");
             }
-            document.budget.give_back_to(taken);
             let posed = self.load_primitives(mesh, weights, Some(&joints))?;
             let instances =
                 posed.into_iter().map(|(mesh, world_from_mesh)| Instance { mesh, world_from_mesh });
-            self.scene.instances.extend(instances);
+            let list = &mut self.scene.instances;
+            document.budget.grow(&place, list, instances.len() as u64, "instances")?;
+            list.extend(instances);
             return Ok(());
         }
         let key = (mesh.value(), weights.iter().map(|w| w.to_bits()).collect());
@@ -179,11 +180,13 @@ impl Loader<'_> {
             }
         };
         let world_from_node = hierarchy.world_from_node[index];
+        let count = Copies::count(document, node, &place)?;
+        let instances = count.unwrap_or(1).saturating_mul(meshes.len() as u64);
+        document.budget.grow(&place, &mut self.scene.instances, instances, "instances")?;
         let taken = document.budget.taken();
-        let copies = Copies::of(document, node, &place, meshes.len())?;
-        let count = copies.as_ref().map_or(1, Copies::len);
-        self.scene.instances.reserve(count * meshes.len());
-        for i in 0..count {
+        let load = |count| Copies::load(document, node, &place, count as usize);
+        let copies = count.map(load).transpose()?;
+        for i in 0..count.unwrap_or(1) as usize {
             let world_from_mesh = match &copies {
                 Some(copies) => world_from_node * copies.node_from_copy(document, i)?,
                 None => world_from_node,
@@ -195,10 +198,8 @@ impl Loader<'_> {
             let place = |&mesh: &usize| Instance { mesh, world_from_mesh };
             self.scene.instances.extend(meshes.iter().map(place));
         }
-        drop(copies);
-        let instances = (count * meshes.len()) as u64;
         document.budget.give_back_to(taken);
-        document.budget.take(&place, instances, "instances", size_of::<Instance>())
+        Ok(())
     }
 
     /// Adds the primitives of a mesh to the scene, in the pose of the joints if there are any.
@@ -230,6 +231,7 @@ impl Loader<'_> {
             let Some(mut loaded) = loaded else { continue };
             let mesh = &mut loaded.mesh;
             document.budget.take(&place, 1, "mesh", mesh.bytes())?;
+            document.budget.grow(&place, &mut self.scene.meshes, 1, "meshes")?;
             let world_from_mesh = match joints {
                 Some(joints) if !loaded.influences.is_empty() => {
                     let influences = &loaded.influences;
