@@ -1,12 +1,12 @@
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::points::Points;
-use crate::scene::{Attributes, SceneBuffers};
+use crate::scene::SceneBuffers;
 use crate::timer::Timer;
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
-use std::mem::{offset_of, size_of};
+use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
     CasterInstance, Casters, DEPTH_FORMAT, DepthProjection, Frame, Mask, MeshCasters, MeshKind,
@@ -76,27 +76,6 @@ const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
     }],
 };
 
-const ATTRIBUTES: VertexBufferLayout<'static> = VertexBufferLayout {
-    array_stride: size_of::<Attributes>() as u64,
-    step_mode: VertexStepMode::Vertex,
-    attributes: &[
-        VertexAttribute {
-            format: VertexFormat::Float32x2,
-            offset: offset_of!(Attributes, uv) as u64,
-            shader_location: 4,
-        },
-        VertexAttribute {
-            format: VertexFormat::Float32x3,
-            offset: offset_of!(Attributes, normal) as u64,
-            shader_location: 5,
-        },
-    ],
-};
-
-/// The attributes that masked casters need.
-const UVS: VertexBufferLayout<'static> =
-    VertexBufferLayout { attributes: ATTRIBUTES.attributes.split_at(1).0, ..ATTRIBUTES };
-
 impl<'g, 's> Renderer<'g, 's> {
     /// Makes a renderer that looks up its shadow maps according to `options`.
     ///
@@ -146,11 +125,13 @@ impl<'g, 's> Renderer<'g, 's> {
             MeshKind::Opaque,
             &[positions.clone(), instances.clone()],
         );
+        let all = scene.attribute_layout.clone();
+        let uvs = VertexBufferLayout { attributes: &all.attributes[..1], ..all };
         let masked = MeshCasters::new(
             device,
             &shadows,
             MeshKind::Masked,
-            &[positions, instances, Some(UVS)],
+            &[positions, instances, Some(uvs)],
         );
         let masks = scene.materials.iter().map(|m| {
             let mask = m.mask.as_ref()?;
@@ -320,8 +301,9 @@ impl<'g, 's> Renderer<'g, 's> {
 
     /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
     pub(crate) fn pipelines(&mut self, name: &'static str, formats: &[TextureFormat]) -> Pipelines {
-        let Self { gpu, shader, layout, pictures, .. } = self;
-        let made = || pipelines(gpu, shader, layout, name, formats);
+        let Self { gpu, scene, shader, layout, pictures, .. } = self;
+        let attributes = &scene.attribute_layout;
+        let made = || pipelines(gpu, shader, layout, name, formats, attributes);
         pictures.entry(name).or_insert_with(made).clone()
     }
 
@@ -550,9 +532,10 @@ fn pipelines(
     layout: &PipelineLayout,
     name: &str,
     formats: &[TextureFormat],
+    attributes: &VertexBufferLayout<'static>,
 ) -> Pipelines {
     let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
-    let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(ATTRIBUTES)];
+    let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(attributes.clone())];
     let pipeline = |vertex, what: &str, buffers: &[Option<VertexBufferLayout<'_>>], compare| {
         let fragment = format!("{what}_{name}");
         gpu.device().create_render_pipeline(&RenderPipelineDescriptor {

@@ -3,7 +3,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::{Aabb, Camera};
-use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene, Texture, Wrap};
+use umbrage_scene::{Alpha, Instance, Material, Mesh, Sampling, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
@@ -11,6 +11,7 @@ use wgpu::{
     BufferBindingType, BufferUsages, Extent3d, FilterMode, Sampler, SamplerBindingType,
     SamplerDescriptor, ShaderStages, TextureDescriptor, TextureDimension, TextureFormat,
     TextureSampleType, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+    VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode,
 };
 
 /// The meshes and materials of a scene on a GPU.
@@ -18,6 +19,8 @@ pub struct SceneBuffers<'a> {
     scene: &'a Scene,
     pub(crate) positions: Buffer,
     pub(crate) attributes: Buffer,
+    /// Layout of `attributes`, of which the first is all that masked casters need.
+    pub(crate) attribute_layout: VertexBufferLayout<'static>,
     pub(crate) indices: Buffer,
     /// One for each mesh.
     pub(crate) meshes: Vec<MeshRange>,
@@ -70,12 +73,27 @@ pub(crate) struct GpuMask {
 }
 
 /// The attributes of a vertex without its position, which has a buffer of its own because opaque
-/// casters need nothing else.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Attributes {
-    pub(crate) normal: Vec3,
-    pub(crate) uv: Vec2,
+/// casters need nothing else: normal and texture coordinates.
+const PLAIN: VertexBufferLayout<'static> = VertexBufferLayout {
+    array_stride: 5 * size_of::<f32>() as u64,
+    step_mode: VertexStepMode::Vertex,
+    attributes: &[uv(VertexFormat::Float32x2), NORMAL],
+};
+
+/// The attributes of a vertex in scenes where masked vertices have an alpha of their own. It is the
+/// fourth number after the normal; the third is padding.
+const WITH_ALPHA: VertexBufferLayout<'static> = VertexBufferLayout {
+    array_stride: 7 * size_of::<f32>() as u64,
+    attributes: &[uv(VertexFormat::Float32x4), NORMAL],
+    ..PLAIN
+};
+
+const NORMAL: VertexAttribute =
+    VertexAttribute { format: VertexFormat::Float32x3, offset: 0, shader_location: 5 };
+
+/// Texture coordinates, with alpha if the format has four components.
+const fn uv(format: VertexFormat) -> VertexAttribute {
+    VertexAttribute { format, offset: size_of::<Vec3>() as u64, shader_location: 4 }
 }
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -97,7 +115,10 @@ impl<'a> SceneBuffers<'a> {
         let largest = limits.max_buffer_size.min(u64::from(u32::MAX));
         let vertices: usize = scene.meshes.iter().map(|m| m.positions.len()).sum();
         let indices: usize = scene.meshes.iter().map(|m| 3 * m.triangles.len()).sum();
-        let bytes = (vertices * size_of::<Attributes>()).max(4 * indices) as u64;
+        let has_alpha = scene.meshes.iter().any(|m| !m.alphas.is_empty());
+        let attribute_layout = if has_alpha { WITH_ALPHA } else { PLAIN };
+        let floats = attribute_layout.array_stride as usize / size_of::<f32>();
+        let bytes = (vertices as u64 * attribute_layout.array_stride).max(4 * indices as u64);
         if bytes > largest {
             return Err(Error::TooLarge {
                 what: "the scene".into(),
@@ -115,7 +136,10 @@ impl<'a> SceneBuffers<'a> {
         }
         let all_positions: Vec<Vec3> =
             scene.meshes.iter().flat_map(|m| m.positions.iter().copied()).collect();
-        let attributes: Vec<Attributes> = scene.meshes.iter().flat_map(attributes).collect();
+        let mut attributes = Vec::with_capacity(vertices * floats);
+        for mesh in &scene.meshes {
+            push_attributes(mesh, has_alpha, &mut attributes);
+        }
         let all_indices: Vec<[u32; 3]> =
             scene.meshes.iter().flat_map(|m| m.triangles.iter().copied()).collect();
         let material_layout = material_layout(gpu);
@@ -154,6 +178,7 @@ impl<'a> SceneBuffers<'a> {
                 bytemuck::cast_slice(&attributes),
                 BufferUsages::VERTEX,
             ),
+            attribute_layout,
             indices: gpu.buffer("indices", bytemuck::cast_slice(&all_indices), BufferUsages::INDEX),
             meshes,
             materials: materials.list,
@@ -189,11 +214,15 @@ impl<'a> SceneBuffers<'a> {
     }
 }
 
-fn attributes(mesh: &Mesh) -> impl Iterator<Item = Attributes> {
-    (0..mesh.positions.len()).map(|i| Attributes {
-        normal: mesh.normals.get(i).copied().unwrap_or(Vec3::ZERO),
-        uv: mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO),
-    })
+/// Adds the attributes of a mesh's vertices, as [`PLAIN`] or [`WITH_ALPHA`] lays them out.
+fn push_attributes(mesh: &Mesh, has_alpha: bool, attributes: &mut Vec<f32>) {
+    for i in 0..mesh.positions.len() {
+        attributes.extend(mesh.normals.get(i).copied().unwrap_or(Vec3::ZERO).to_array());
+        attributes.extend(mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO).to_array());
+        if has_alpha {
+            attributes.extend([0.0, mesh.alphas.get(i).copied().unwrap_or(1.0)]);
+        }
+    }
 }
 
 /// Collects the materials in the order in which meshes use them.
@@ -244,12 +273,17 @@ impl<'a> Materials<'a> {
             Wrap::Mirror => AddressMode::MirrorRepeat,
             Wrap::Clamp => AddressMode::ClampToEdge,
         });
+        let sampling = texture.map(|id| self.scene.textures[id.0].sampling).unwrap_or_default();
+        let filter = match sampling {
+            Sampling::Linear => FilterMode::Linear,
+            Sampling::Nearest => FilterMode::Nearest,
+        };
         let sampler = device.create_sampler(&SamplerDescriptor {
             label: Some("material"),
             address_mode_u,
             address_mode_v,
-            mag_filter: FilterMode::Linear,
-            min_filter: FilterMode::Linear,
+            mag_filter: filter,
+            min_filter: filter,
             ..SamplerDescriptor::default()
         });
         let cutoff = match material.alpha {
@@ -258,7 +292,8 @@ impl<'a> Materials<'a> {
         };
         let uniform = MaterialUniform {
             base_color: material.base_color,
-            cutoff: cutoff.unwrap_or(f32::MIN),
+            // The margin is that of `MeshCasters`, for the same reason.
+            cutoff: cutoff.map_or(f32::MIN, |cutoff| cutoff * (1.0 - 8.0 * f32::EPSILON)),
             padding: [0.0; 3],
         };
         let contents = bytemuck::bytes_of(&uniform);

@@ -1,3 +1,4 @@
+use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 
 /// Why a scene could not be loaded or built.
@@ -22,6 +23,23 @@ pub enum SceneError {
         /// What is wrong there, and what would be right.
         problem: String,
     },
+    /// Loading the scene would take more memory than it may.
+    #[error(
+        "{}: {place}: with {what} the scene would take {}, it may take at most {}",
+        .path.display(), Mebibytes(*.needs), Mebibytes(*.limit)
+    )]
+    TooLarge {
+        /// Path of the scene file.
+        path: PathBuf,
+        /// Place in the file, as a JSON path such as `nodes[3]`.
+        place: String,
+        /// What there is too much of, with its number, such as `67108864 instances`.
+        what: String,
+        /// The memory that all of the scene up to there would take, bytes.
+        needs: u64,
+        /// The memory that the scene may take, bytes.
+        limit: u64,
+    },
     /// No built-in scene has this name.
     #[error("no built-in scene is called {name:?}; did you mean {nearest:?}?")]
     UnknownBuiltin {
@@ -40,4 +58,13 @@ pub enum SceneError {
         /// The largest valid size; the smallest is 1.
         max: u32,
     },
+}
+
+/// Bytes for people to read.
+struct Mebibytes(u64);
+
+impl Display for Mebibytes {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} MiB", self.0.div_ceil(1 << 20))
+    }
 }

@@ -14,8 +14,8 @@ mod view;
 
 pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;
-pub use load::{files, load};
+pub use load::{SCENE_BYTES, files, load, load_within};
 pub use types::{
-    Alpha, Instance, Lens, Material, Mesh, Notice, Scene, SceneCamera, SceneLight, Texture,
-    TextureId, Wrap,
+    Alpha, Instance, Lens, Material, Mesh, Notice, Sampling, Scene, SceneCamera, SceneLight,
+    Texture, TextureId, Wrap,
 };

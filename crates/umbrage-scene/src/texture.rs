@@ -1,4 +1,4 @@
-use crate::types::{Texture, Wrap};
+use crate::types::{Sampling, Texture, Wrap};
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::LazyLock;
 
@@ -11,13 +11,13 @@ static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
 });
 
 impl Texture {
-    /// Linear red, green, blue and straight alpha at texture coordinates `uv`, interpolated
-    /// bilinearly between pixel centres. (0, 0) is the upper left corner of the image, as in glTF.
+    /// Linear red, green, blue and straight alpha at texture coordinates `uv`, as
+    /// [`sampling`](Self::sampling) continues them between pixel centres. (0, 0) is the upper left corner of the image, as in glTF.
     ///
     /// Coordinates that are not finite count as 0. A texture without pixels is opaque white.
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         let table = &*LINEAR_FROM_SRGB;
-        self.bilinear(uv, Vec4::ONE, |p| {
+        self.value(uv, Vec4::ONE, |p| {
             let color = Vec3::from([p[0], p[1], p[2]].map(|c| table[usize::from(c)]));
             color.extend(f32::from(p[3]) / 255.0)
         })
@@ -25,38 +25,57 @@ impl Texture {
 
     /// Only the alpha of [`sample`](Self::sample), for shadow rays, which do not need the colour.
     pub fn sample_alpha(&self, uv: Vec2) -> f32 {
-        self.bilinear(uv, 1.0, |p| f32::from(p[3]) / 255.0)
+        self.value(uv, 1.0, |p| f32::from(p[3]) / 255.0)
     }
 
-    fn bilinear<T>(&self, uv: Vec2, otherwise: T, pixel: impl Fn([u8; 4]) -> T) -> T
+    fn value<T>(&self, uv: Vec2, otherwise: T, pixel: impl Fn([u8; 4]) -> T) -> T
     where
         T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
     {
         let [w, h] = self.size;
-        let (x0, x1, fx) = neighbours(uv.x, w, self.wrap[0]);
-        let (y0, y1, fy) = neighbours(uv.y, h, self.wrap[1]);
         let at =
             |x: usize, y: usize| self.rgba.get(y * w as usize + x).map_or(otherwise, |&p| pixel(p));
+        if self.sampling == Sampling::Nearest {
+            return at(nearest(uv.x, w, self.wrap[0]), nearest(uv.y, h, self.wrap[1]));
+        }
+        let (x0, x1, fx) = neighbours(uv.x, w, self.wrap[0]);
+        let (y0, y1, fy) = neighbours(uv.y, h, self.wrap[1]);
         let upper = at(x0, y0) * (1.0 - fx) + at(x1, y0) * fx;
         let lower = at(x0, y1) * (1.0 - fx) + at(x1, y1) * fx;
         upper * (1.0 - fy) + lower * fy
     }
 }
 
+/// Index of the pixel that a texture coordinate falls into.
+fn nearest(coordinate: f32, size: u32, wrap: Wrap) -> usize {
+    wrapped((pixels(coordinate, size, wrap)).floor() as i64, size, wrap)
+}
+
 /// Indices of the two pixels whose centres enclose a texture coordinate, and the weight of the
 /// second.
 fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
+    let x = pixels(coordinate, size, wrap) - 0.5;
+    let first = x.floor();
+    let index = |i: f32| wrapped(i as i64, size, wrap);
+    (index(first), index(first + 1.0), x - first)
+}
+
+/// A texture coordinate in pixels. It is reduced to one period first, so that large coordinates keep
+/// their precision.
+fn pixels(coordinate: f32, size: u32, wrap: Wrap) -> f32 {
     let c = if coordinate.is_finite() { coordinate } else { 0.0 };
-    // The coordinate is first reduced to one period, so that large coordinates keep their
-    // precision.
     let c = match wrap {
         Wrap::Repeat => c.rem_euclid(1.0),
         Wrap::Mirror => c.rem_euclid(2.0),
         Wrap::Clamp => c.clamp(0.0, 1.0),
     };
-    let x = c * size as f32 - 0.5;
+    c * size as f32
+}
+
+/// The pixel that stands for pixel `i`, which may lie outside the image.
+fn wrapped(i: i64, size: u32, wrap: Wrap) -> usize {
     let n = i64::from(size.max(1));
-    let index = |i: i64| match wrap {
+    let i = match wrap {
         Wrap::Repeat => i.rem_euclid(n),
         Wrap::Mirror => {
             let i = i.rem_euclid(2 * n);
@@ -64,8 +83,7 @@ fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
         }
         Wrap::Clamp => i.clamp(0, n - 1),
     };
-    let first = x.floor();
-    (index(first as i64) as usize, index(first as i64 + 1) as usize, x - first)
+    i as usize
 }
 
 #[cfg(test)]
@@ -74,7 +92,8 @@ mod tests {
 
     fn checker(wrap: Wrap) -> Texture {
         let (black, white) = ([0, 0, 0, 255], [255, 255, 255, 0]);
-        Texture { size: [2, 2], rgba: vec![black, white, white, black], wrap: [wrap; 2] }
+        let rgba = vec![black, white, white, black];
+        Texture { size: [2, 2], rgba, wrap: [wrap; 2], ..Texture::default() }
     }
 
     #[test]
@@ -88,7 +107,7 @@ mod tests {
 
     #[test]
     fn colour_is_decoded_from_srgb_and_alpha_is_not() {
-        let t = Texture { size: [1, 1], rgba: vec![[188, 10, 0, 128]], wrap: Default::default() };
+        let t = Texture { size: [1, 1], rgba: vec![[188, 10, 0, 128]], ..Texture::default() };
         let s = t.sample(Vec2::new(7.3, -2.9));
         assert!((s.x - 0.5029).abs() < 1e-4, "{s}");
         assert!((s.y - 10.0 / 255.0 / 12.92).abs() < 1e-7, "{s}");
@@ -106,6 +125,22 @@ mod tests {
         assert_eq!(at(Wrap::Mirror, 0.0), 0.0);
         assert_eq!(at(Wrap::Clamp, 9.0), 1.0);
         assert_eq!(at(Wrap::Clamp, -9.0), 0.0);
+    }
+
+    #[test]
+    fn nearest_pixels_are_rectangles() {
+        let at = |wrap, u: f32| {
+            Texture { sampling: Sampling::Nearest, ..checker(wrap) }.sample(Vec2::new(u, 0.25)).x
+        };
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            let values = [0.0, 0.25, 0.499_999, 0.5, 0.75, 0.999_999].map(|u| at(wrap, u));
+            assert_eq!(values, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0], "{wrap:?}");
+        }
+        // The image's end belongs to its last pixel, unless another copy begins there.
+        let ends = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].map(|wrap| at(wrap, 1.0));
+        assert_eq!(ends, [0.0, 1.0, 1.0]);
+        let before = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp].map(|wrap| at(wrap, -0.1));
+        assert_eq!(before, [1.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -31,6 +31,9 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one per position; empty if the mesh has none.
     pub uvs: Vec<Vec2>,
+    /// Alpha of the vertices, which multiplies the material's alpha, one per position, in [0, 1];
+    /// empty if it is 1 everywhere. Only alpha masks use it.
+    pub alphas: Vec<f32>,
     /// Indices of the corners of each triangle, counter-clockwise as seen from the front; all in
     /// range.
     pub triangles: Vec<[u32; 3]>,
@@ -70,7 +73,7 @@ pub enum Alpha {
     /// Where alpha is below the cutoff there is no surface: it is neither visible nor casts a
     /// shadow.
     Mask {
-        /// The cutoff, in [0, 1].
+        /// The cutoff, at least 0. Above 1 there is no surface anywhere.
         cutoff: f32,
     },
 }
@@ -88,6 +91,18 @@ pub struct Texture {
     pub rgba: Vec<[u8; 4]>,
     /// Addressing outside [0, 1], for u and for v.
     pub wrap: [Wrap; 2],
+    /// How the texture continues between the centres of its pixels.
+    pub sampling: Sampling,
+}
+
+/// How a texture continues between the centres of its pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Sampling {
+    /// It is interpolated bilinearly.
+    #[default]
+    Linear,
+    /// Each pixel is a rectangle of one colour and alpha.
+    Nearest,
 }
 
 /// How a texture continues outside [0, 1].
@@ -217,6 +232,15 @@ impl Scene {
 }
 
 impl Mesh {
+    /// The memory of the mesh's lists, bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.positions)
+            + size_of_val(&*self.normals)
+            + size_of_val(&*self.uvs)
+            + size_of_val(&*self.alphas)
+            + size_of_val(&*self.triangles)
+    }
+
     /// The box around the corners of the triangles, mesh space, metres.
     pub fn bounds(&self) -> Aabb {
         self.bounds_in(|p| p)

@@ -13,7 +13,9 @@ pub(crate) fn check_mesh(mesh: &Mesh, index: usize, scene: &Scene) -> Result<(),
     {
         return wrong(format!("positions[{i}]"), "must be finite and at most 1e12".into());
     }
-    for (field, length) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
+    let lists =
+        [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len()), ("alphas", mesh.alphas.len())];
+    for (field, length) in lists {
         if length != 0 && length != count {
             let problem = format!("has {length} entries for {count} positions");
             return wrong(field.into(), problem);

@@ -124,7 +124,8 @@ struct MeshBoxes<'a> {
     mask: Option<Mask<'a>>,
 }
 
-/// An alpha mask: where `factor` times the texture's alpha is below `cutoff`, there is no surface.
+/// An alpha mask: where `factor` times the alpha of the texture and of the vertices is below `cutoff`,
+/// there is no surface.
 struct Mask<'a> {
     cutoff: f32,
     factor: f32,
@@ -433,8 +434,10 @@ impl<'a> Tracer<'a> {
         let Some(mask) = self.meshes[index].mask.as_ref().filter(|_| !self.opaque) else {
             return true;
         };
-        let uv = texture_coordinates(&self.scene.meshes[index], primitive, hit.weights);
-        mask.factor * mask.texture.map_or(1.0, |t| t.sample_alpha(uv)) >= mask.cutoff
+        let mesh = &self.scene.meshes[index];
+        let uv = texture_coordinates(mesh, primitive, hit.weights);
+        let alpha = mask.texture.map_or(1.0, |t| t.sample_alpha(uv));
+        mask.factor * alpha * vertex_alpha(mesh, primitive, hit.weights) >= mask.cutoff
     }
 
     /// Calls `visit` with every triangle that the ray meets, and with some beyond the range.
@@ -512,6 +515,16 @@ fn texture_coordinates(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) 
     let [a, b, c] =
         mesh.triangles[primitive.triangle as usize].map(|i| mesh.uvs[i as usize].as_dvec2());
     (a * weights[0] + b * weights[1] + c * weights[2]).as_vec2()
+}
+
+/// The alpha of the vertices, interpolated.
+fn vertex_alpha(mesh: &Mesh, primitive: PrimitiveRef, weights: [f64; 3]) -> f32 {
+    if mesh.alphas.is_empty() {
+        return 1.0;
+    }
+    let corners = mesh.triangles[primitive.triangle as usize];
+    let alphas = corners.map(|i| f64::from(mesh.alphas[i as usize]));
+    (alphas[0] * weights[0] + alphas[1] * weights[1] + alphas[2] * weights[2]) as f32
 }
 
 /// The texture of a material; `None` if it has none or the mesh has no texture coordinates.

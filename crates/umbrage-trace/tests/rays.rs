@@ -5,7 +5,7 @@ mod common;
 use common::{Random, all_hits, at, ground, scene, sheet, soup, sphere};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 use proptest::prelude::*;
-use umbrage_scene::{Alpha, Instance, Scene, Texture, TextureId};
+use umbrage_scene::{Alpha, Instance, Sampling, Scene, Texture, TextureId};
 use umbrage_trace::{Error, Ray, Tracer};
 
 const EVERYWHERE: [f64; 2] = [0.0, f64::INFINITY];
@@ -277,6 +277,72 @@ fn masks_cut_holes() {
     let tracer = Tracer::new(&scene).unwrap();
     assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).primitive.instance, 1);
     assert_eq!(common::below(&tracer, DVec3::new(5.3, 3.0, 0.4)).uv, Vec2::new(0.52, 0.765));
+}
+
+/// A texture of few pixels, sampled to the nearest, cuts the same shape as triangles do.
+#[test]
+fn nearest_pixels_are_exact_rectangles() {
+    const N: u32 = 4;
+    let is_solid = |x: u32, y: u32| (x * 5 + y * 3) % 7 % 2 == 0;
+    let pixels = || (0..N * N).map(|i| (i % N, i / N));
+    let mut cut = scene(vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)], &[(0, at(5.0, 1.0, 0.0))]);
+    cut.textures.push(Texture {
+        size: [N, N],
+        rgba: pixels().map(|(x, y)| [255, 255, 255, 255 * u8::from(is_solid(x, y))]).collect(),
+        sampling: Sampling::Nearest,
+        ..Texture::default()
+    });
+    cut.materials[0].alpha = Alpha::Mask { cutoff: 0.5 };
+    cut.materials[0].base_color_texture = Some(TextureId(0));
+    let side = 1.0 / N as f32;
+    let square =
+        |(x, y)| sheet(Vec3::new(x as f32, 0.0, y as f32) * side, Vec3::X * side, Vec3::Z * side);
+    let squares: Vec<_> = pixels().filter(|&(x, y)| is_solid(x, y)).map(square).collect();
+    let places: Vec<_> = (0..squares.len()).map(|i| (i, at(5.0, 1.0, 0.0))).collect();
+    let solid = scene(squares, &places);
+    let [cut, solid] = [&cut, &solid].map(|scene| Tracer::new(scene).unwrap());
+    let mut random = Random(4);
+    let mut hits = 0;
+    for _ in 0..2000 {
+        let [u, v] = [random.between(-0.2, 1.2), random.between(-0.2, 1.2)];
+        let direction = DVec3::new(random.between(-1.0, 1.0), -1.0, random.between(-1.0, 1.0));
+        let ray = Ray { origin: DVec3::new(5.0 + u, 1.0, v) - direction, direction };
+        let found = [&cut, &solid].map(|t| t.closest(ray, EVERYWHERE).map(|hit| hit.t as f32));
+        assert_eq!(found[0], found[1], "{u} {v}");
+        assert_eq!(cut.occluded(ray, EVERYWHERE), found[1].is_some());
+        hits += usize::from(found[1].is_some());
+    }
+    assert!((400..1200).contains(&hits), "{hits}");
+}
+
+/// The alpha of the vertices is interpolated, and multiplies that of factor and texture.
+#[test]
+fn vertices_cut_holes() {
+    let mut scene = scene(vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)], &[(0, at(0.0, 1.0, 0.0))]);
+    let is_there = |scene: &Scene, x: f64, z: f64| {
+        let ray = Ray { origin: DVec3::new(x, 3.0, z), direction: -DVec3::Y };
+        Tracer::new(scene).unwrap().occluded(ray, EVERYWHERE)
+    };
+    // Alpha is x.
+    scene.meshes[0].alphas = vec![0.0, 1.0, 1.0, 0.0];
+    assert!(is_there(&scene, 0.1, 0.3), "opaque materials have no alpha");
+    scene.materials[0].alpha = Alpha::Mask { cutoff: 0.5 };
+    for z in [0.2, 0.9] {
+        assert!(is_there(&scene, 0.51, z) && !is_there(&scene, 0.49, z));
+    }
+    scene.materials[0].base_color.w = 0.6;
+    assert!(is_there(&scene, 0.84, 0.3) && !is_there(&scene, 0.83, 0.3));
+    // An alpha that equals the cutoff everywhere leaves no hole.
+    scene.materials[0].base_color.w = 1.0;
+    scene.materials[0].alpha = Alpha::Mask { cutoff: 0.3 };
+    scene.meshes[0].alphas = vec![0.3; 4];
+    for i in 0..100 {
+        assert!(is_there(&scene, 0.005 + 0.0099 * f64::from(i), 0.37), "{i}");
+    }
+    // A cutoff above 1 leaves nothing.
+    scene.materials[0].alpha = Alpha::Mask { cutoff: 1.5 };
+    scene.meshes[0].alphas = Vec::new();
+    assert!(!is_there(&scene, 0.5, 0.3));
 }
 
 #[test]

@@ -39,7 +39,8 @@ pub struct CasterInstance {
     pub render_from_mesh: [Vec4; 3],
 }
 
-/// The alpha of a masked material, which is `factor` times the texture's alpha.
+/// The alpha of a masked material, which is `factor` times the alpha of the texture and of the
+/// vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask<'a> {
     /// The texture whose alpha is used. It is sampled at mip level 0.
@@ -82,7 +83,8 @@ impl MeshCasters {
     /// Creates the pipeline for vertex buffers with these layouts. `buffers` must have the position
     /// (`Float32x3`) at shader location 0, the instance's rows at locations 1 to 3 (see
     /// [`CasterInstance::LAYOUT`]) and, for masked meshes, texture coordinates (`Float32x2`) at
-    /// location 4.
+    /// location 4. Where masked vertices have an alpha of their own, it is the fourth component of a
+    /// `Float32x4` there; the third is not read.
     pub fn new(
         device: &Device,
         shadows: &Shadows,
@@ -141,7 +143,10 @@ impl MeshCasters {
     /// The bind group of a mask; `None` if the pipeline is for opaque meshes.
     pub fn mask(&self, device: &Device, queue: &Queue, mask: &Mask<'_>) -> Option<BindGroup> {
         let layout = self.mask_layout.as_ref()?;
-        let contents = data::Mask { factor: mask.factor, cutoff: mask.cutoff };
+        // Interpolation rounds. The margin keeps alphas that equal the cutoff from being holes here
+        // and there.
+        let cutoff = mask.cutoff * (1.0 - 8.0 * f32::EPSILON);
+        let contents = data::Mask { factor: mask.factor, cutoff };
         let uniform = device.create_buffer(&BufferDescriptor {
             label: Some("shadow mask"),
             size: size_of::<data::Mask>() as u64,

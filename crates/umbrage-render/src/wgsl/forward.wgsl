@@ -53,7 +53,8 @@ struct Vertex {
     @location(1) render_from_mesh_x: vec4f,
     @location(2) render_from_mesh_y: vec4f,
     @location(3) render_from_mesh_z: vec4f,
-    @location(4) uv: vec2f,
+    // Texture coordinates and, as the fourth component, alpha. Scenes without alphas give 1.
+    @location(4) uv_alpha: vec4f,
     @location(5) normal: vec3f,
 }
 
@@ -61,7 +62,8 @@ struct Fragment {
     @builtin(position) clip: vec4f,
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
+    // Texture coordinates and alpha.
+    @location(2) uv_alpha: vec3f,
 }
 
 @vertex
@@ -80,7 +82,7 @@ fn mesh_vertex(vertex: Vertex) -> Fragment {
         dot(cross(x.xyz, y.xyz), n),
     );
     let clip = view.clip_from_render * vec4f(position, 1.0);
-    return Fragment(clip, position, normalize_or_zero(normal), vertex.uv);
+    return Fragment(clip, position, normalize_or_zero(normal), vertex.uv_alpha.xyw);
 }
 
 @vertex
@@ -116,7 +118,7 @@ fn triangle_normal(in: Fragment) -> vec3f {
 }
 
 fn base_color(in: Fragment) -> vec4f {
-    let texel = textureSampleLevel(material_texture, material_sampler, in.uv, 0.0);
+    let texel = textureSampleLevel(material_texture, material_sampler, in.uv_alpha.xy, 0.0);
     return material.base_color * texel;
 }
 
@@ -138,7 +140,7 @@ fn masked_surface(in: Fragment) -> Surface {
     let normal = triangle_normal(in);
     let normal_error = normal_error(in);
     let color = base_color(in);
-    if (color.a < material.cutoff) {
+    if (color.a * in.uv_alpha.z < material.cutoff) {
         discard;
     }
     return surface(in, normal, normal_error, color.rgb);

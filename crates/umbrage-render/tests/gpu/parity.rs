@@ -1,11 +1,12 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
 use crate::{GPU, Set, scene};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use umbrage::{Camera, Light, Plan, Size, SpotLight, Technique};
 use umbrage_render::{Renderer, Sample, SceneBuffers, Shading};
+use umbrage_scene::{Alpha, Instance, Material, Mesh, Sampling, Scene, Texture, TextureId, Wrap};
 use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, LookupBuffers, ShadowOptions, Support};
@@ -187,6 +188,64 @@ fn at_a_fence() {
 }
 
 /// A point light, which has six or more maps.
+/// A ground, and three sheets with holes that stand on it: cut by the pixels of a texture that is
+/// sampled to the nearest, by the alpha of the vertices, and by both.
+fn cut_out() -> Scene {
+    let material = |texture, cutoff| Material {
+        name: "cut out".into(),
+        base_color: Vec4::new(0.8, 0.6, 0.5, 1.0),
+        base_color_texture: texture,
+        alpha: Alpha::Mask { cutoff },
+        double_sided: true,
+    };
+    let sheet = |corner: Vec3, u: Vec3, v: Vec3, alphas: &[f32], material| Mesh {
+        positions: vec![corner, corner + u, corner + u + v, corner + v],
+        normals: vec![u.cross(v).normalize(); 4],
+        uvs: vec![Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO],
+        alphas: alphas.into(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material,
+    };
+    let standing = |x: f32, alphas: &[f32], material| {
+        sheet(Vec3::new(x, 0.1, 0.0), Vec3::X * 1.8, Vec3::Y * 2.0, alphas, material)
+    };
+    let ground = Vec3::new(-5.0, 0.0, 4.0);
+    let ramp = [1.0, 0.0, 0.3, 1.0];
+    Scene {
+        meshes: vec![
+            // An alpha that equals the cutoff leaves no hole.
+            sheet(ground, Vec3::X * 10.0, Vec3::Z * -8.0, &[0.3; 4], 2),
+            standing(-3.0, &[], 0),
+            standing(-0.9, &ramp, 1),
+            standing(1.2, &ramp, 0),
+        ],
+        instances: (0..4)
+            .map(|mesh| Instance { mesh, world_from_mesh: DAffine3::IDENTITY })
+            .collect(),
+        materials: vec![
+            material(Some(TextureId(0)), 0.5),
+            material(None, 0.5),
+            material(None, 0.3),
+        ],
+        textures: vec![Texture {
+            size: [4, 4],
+            rgba: (0..16u32).map(|i| [90, 200, 120, [255, 0, 150][i as usize * 5 % 3]]).collect(),
+            wrap: [Wrap::Clamp; 2],
+            sampling: Sampling::Nearest,
+        }],
+        ..Scene::default()
+    }
+}
+
+#[needs(gpu)]
+#[test]
+fn behind_sheets_with_holes() {
+    let scene = cut_out();
+    let set = Set::new(&scene, IMAGE);
+    agrees_with("cut out", &set, &technique(TECHNIQUES[1], Filter::Hard));
+    agrees_with("cut out", &set, &technique(TECHNIQUES[7], Filter::Pcf { n: 3 }));
+}
+
 #[needs(gpu)]
 #[test]
 fn around_a_lantern() {

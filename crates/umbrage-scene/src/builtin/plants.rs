@@ -175,5 +175,6 @@ pub(super) fn leaf_texture(tint: Vec3) -> Texture {
         let alpha = (inside * N as f32 + 0.5).clamp(0.0, 1.0) * 255.0;
         [color.x as u8, color.y as u8, color.z as u8, alpha as u8]
     };
-    Texture { size: [N, N], rgba: (0..N * N).map(pixel).collect(), wrap: [Wrap::Clamp; 2] }
+    let rgba = (0..N * N).map(pixel).collect();
+    Texture { size: [N, N], rgba, wrap: [Wrap::Clamp; 2], ..Texture::default() }
 }

@@ -6,10 +6,6 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, buffer};
 
-/// Largest number of elements that an accessor may have without bytes for them (a sparse array of
-/// zeros). Without this limit, a tiny file could demand any amount of memory.
-const MAX_IMPLIED: u64 = 1 << 26;
-
 type Id = Index<Accessor>;
 
 impl Document<'_> {
@@ -82,16 +78,18 @@ impl Document<'_> {
         };
         let offset = accessor.byte_offset.map_or(0, |o| o.0);
         let count = accessor.count.0;
+        let take = || self.budget.take(&place, count, "elements", size_of::<[T; N]>());
         let mut values = match accessor.buffer_view {
             Some(view) => {
                 let bytes = self.elements(view, offset, count, element, &place)?;
+                take()?;
                 bytes.map(decode).collect::<Vec<_>>()
             }
             None if accessor.sparse.is_none() => return Err(fail("has no bufferView".into())),
-            None if count > MAX_IMPLIED => {
-                return Err(fail(format!("{count} elements without data are too many")));
+            None => {
+                take()?;
+                vec![[T::default(); N]; count as usize]
             }
-            None => vec![[T::default(); N]; count as usize],
         };
         if let Some(sparse) = &accessor.sparse {
             let Checked::Valid(index_type) = sparse.indices.component_type else {

@@ -1,9 +1,11 @@
-use super::uri;
+use super::budget::Budget;
+use super::{extensions, uri};
 use crate::error::SceneError;
 use crate::types::Notice;
-use gltf::json::{Index, Root, root::Get};
+use gltf::json::{Index, Node, Root, root::Get};
 use std::borrow::Cow;
 use std::fmt::Display;
+use std::fs::Metadata;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -15,23 +17,37 @@ use std::path::{Path, PathBuf};
 pub(super) struct Document<'a> {
     pub(super) path: &'a Path,
     pub(super) root: Root,
+    pub(super) budget: Budget<'a>,
+    /// Whether the JSON begins with a byte order mark.
+    pub(super) has_byte_order_mark: bool,
     /// In the order of the JSON. Each buffer has at least the length that the JSON states.
     buffers: Vec<Cow<'a, [u8]>>,
 }
 
+/// The mark that some editors write at the beginning of a text in UTF-8. glTF forbids it.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 impl<'a> Document<'a> {
-    /// Parses `bytes`, which are the content of the file at `path`.
-    pub(super) fn parse(path: &'a Path, bytes: &'a [u8]) -> Result<Self, SceneError> {
+    /// Parses `bytes`, which are the content of the file at `path` and are already taken from the
+    /// budget.
+    pub(super) fn parse(
+        path: &'a Path,
+        bytes: &'a [u8],
+        budget: Budget<'a>,
+    ) -> Result<Self, SceneError> {
         let fail = |place: &str, problem: String| SceneError::Invalid {
             path: path.into(),
             place: place.into(),
             problem,
         };
         let (json, blob) = match bytes.strip_prefix(b"glTF") {
-            None if !bytes.trim_ascii_start().starts_with(b"{") => {
-                return Err(fail("header", "is neither binary glTF 2.0 nor JSON".into()));
+            None => {
+                let json = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+                if !json.trim_ascii_start().starts_with(b"{") {
+                    return Err(fail("header", "is neither binary glTF 2.0 nor JSON".into()));
+                }
+                (Cow::Borrowed(bytes), None)
             }
-            None => (Cow::Borrowed(bytes), None),
             Some(rest) => {
                 // The length field of the header is checked here, because the crate trusts it to be
                 // at least the header's own length.
@@ -52,9 +68,18 @@ impl<'a> Document<'a> {
                 (glb.json, glb.bin)
             }
         };
-        let root: Root = gltf::json::deserialize::from_slice(&json)
+        let marked = json.strip_prefix(BYTE_ORDER_MARK);
+        let has_byte_order_mark = marked.is_some();
+        let json = marked.unwrap_or(&json);
+        // Objects as short as `{}` take a hundred times their length when they are parsed. Nodes are
+        // the largest kind.
+        let objects = json.iter().filter(|&&b| b == b'{').count() as u64;
+        budget.take("JSON", objects, "objects", size_of::<Node>())?;
+        budget.take("JSON", json.len() as u64, "characters", 1)?;
+        let root: Root = gltf::json::deserialize::from_slice(json)
             .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
-        let mut document = Self { path, root, buffers: Vec::new() };
+        let buffers = Vec::new();
+        let mut document = Self { path, root, budget, has_byte_order_mark, buffers };
         document.check_asset()?;
         document.buffers = document.load_buffers(blob)?;
         Ok(document)
@@ -67,18 +92,7 @@ impl<'a> Document<'a> {
             let problem = format!("is {needs:?}, only glTF 2 can be read");
             return Err(self.invalid("asset.version", problem));
         }
-        // Extensions that only change a surface's look, but not its base colour, can be ignored.
-        let known = |e: &str| {
-            e.starts_with("KHR_materials_")
-                || [
-                    "KHR_lights_punctual",
-                    "KHR_texture_transform",
-                    "KHR_mesh_quantization",
-                    "EXT_mesh_gpu_instancing",
-                ]
-                .contains(&e)
-        };
-        match self.root.extensions_required.iter().find(|e| !known(e)) {
+        match self.root.extensions_required.iter().find(|e| !extensions::can_load(e)) {
             Some(e) => Err(self.invalid(
                 "extensionsRequired",
                 format!("{e} is not supported: export the file without it"),
@@ -125,11 +139,13 @@ impl<'a> Document<'a> {
     /// The bytes that a URI in the file refers to.
     pub(super) fn fetch(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
         if let Some(data) = uri.strip_prefix("data:") {
+            // Base64 has four characters for three bytes.
+            self.budget.take(place, data.len() as u64 / 4 * 3, "bytes of data", 1)?;
             return uri::decode_data(data).map_err(|problem| self.invalid(place, problem));
         }
         let file =
             uri::file_below(self.folder(), uri).map_err(|problem| self.invalid(place, problem))?;
-        read_file(&file)
+        read_file(&file, &self.budget, place)
     }
 
     /// The bytes of a buffer view.
@@ -161,10 +177,13 @@ impl<'a> Document<'a> {
     /// The object that an index found at `place` refers to.
     pub(super) fn get<T>(&self, index: Index<T>, place: &str) -> Result<&T, SceneError>
     where
+        T: Listed,
         Root: Get<T>,
     {
         let found = Get::<T>::get(&self.root, index);
-        found.ok_or_else(|| self.invalid(place, format!("index {} points nowhere", index.value())))
+        found.ok_or_else(|| {
+            self.invalid(place, format!("there is no {}[{}]", T::LIST, index.value()))
+        })
     }
 
     pub(super) fn invalid(&self, place: &str, problem: impl Into<String>) -> SceneError {
@@ -172,21 +191,54 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The content of a regular file.
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, SceneError> {
-    let read = || {
-        let file = std::fs::File::open(path)?;
-        let metadata = file.metadata()?;
-        if !metadata.is_file() {
-            return Err(std::io::Error::other("is not a file"));
-        }
-        let mut bytes = Vec::with_capacity(usize::try_from(metadata.len()).unwrap_or(0));
-        // Reading ends at the length found above, even if the file grows meanwhile or reports a
-        // wrong length.
-        file.take(metadata.len()).read_to_end(&mut bytes)?;
-        Ok(bytes)
+/// Objects of glTF that are listed at the top of the file.
+pub(super) trait Listed {
+    /// The list's name.
+    const LIST: &'static str;
+}
+
+macro_rules! listed {
+    ($($object:ty: $list:literal),+ $(,)?) => {
+        $(impl Listed for $object {
+            const LIST: &'static str = $list;
+        })+
     };
-    read().map_err(|source| SceneError::Read { path: path.into(), source })
+}
+
+listed!(
+    gltf::json::Accessor: "accessors",
+    gltf::json::buffer::View: "bufferViews",
+    gltf::json::Camera: "cameras",
+    gltf::json::Image: "images",
+    gltf::json::Material: "materials",
+    gltf::json::Mesh: "meshes",
+    gltf::json::Scene: "scenes",
+    gltf::json::Skin: "skins",
+    gltf::json::Texture: "textures",
+    gltf::json::texture::Sampler: "samplers",
+);
+
+/// The content of a regular file, for what is at `place` in the scene file.
+pub(super) fn read_file(
+    path: &Path,
+    budget: &Budget<'_>,
+    place: &str,
+) -> Result<Vec<u8>, SceneError> {
+    let fail = |source| SceneError::Read { path: path.into(), source };
+    let check = |metadata: Metadata| match metadata.is_file() {
+        true => Ok(metadata.len()),
+        false => Err(fail(std::io::Error::other("is not a regular file"))),
+    };
+    // This comes before the file is opened, because opening a pipe waits for a writer.
+    check(std::fs::metadata(path).map_err(fail)?)?;
+    let file = std::fs::File::open(path).map_err(fail)?;
+    let length = check(file.metadata().map_err(fail)?)?;
+    budget.take(place, length, "bytes of data", 1)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+    // Reading ends at the length found above, even if the file grows meanwhile or reports a wrong
+    // length.
+    file.take(length).read_to_end(&mut bytes).map_err(fail)?;
+    Ok(bytes)
 }
 
 /// Notices about repairs. Repairs of one kind are collected into one sentence.

@@ -1,4 +1,4 @@
-use super::document::Document;
+use super::document::{Document, Notices};
 use crate::error::SceneError;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Index;
@@ -7,10 +7,17 @@ use gltf::json::Index;
 /// products with positions overflow only much later.
 pub(super) const LARGEST: f64 = 1e100;
 
-/// The world transforms of a file's nodes.
+/// Largest distance of a matrix's last row from 0, 0, 0, 1. Exporters that multiply matrices in
+/// single precision leave such dust.
+const DUST: f64 = 1e-4;
+
+/// The world transforms of a file's nodes, and which nodes show.
 pub(super) struct Hierarchy {
     /// Indexed by node; all finite.
     pub(super) world_from_node: Vec<DAffine3>,
+    /// Indexed by node: whether `KHR_node_visibility` hides the node, directly or with a node above
+    /// it. Hidden nodes have neither meshes nor lights, but they have cameras.
+    pub(super) is_hidden: Vec<bool>,
     /// Indices of the nodes in the shown scene, each once, with parents before their children.
     pub(super) shown: Vec<usize>,
 }
@@ -19,9 +26,10 @@ impl Hierarchy {
     /// Computes the transforms of all nodes.
     ///
     /// # Errors
-    /// A node has two parents or is its own ancestor, or its transform is invalid.
-    pub(super) fn of(document: &Document) -> Result<Self, SceneError> {
+    /// A node has two parents or is its own ancestor, or its transform or visibility is invalid.
+    pub(super) fn of(document: &Document, notices: &mut Notices) -> Result<Self, SceneError> {
         let nodes = &document.root.nodes;
+        document.budget.take("nodes", nodes.len() as u64, "nodes", size_of::<DAffine3>())?;
         let children = |i: usize| nodes[i].children.iter().flatten().map(Index::value);
         let mut parent = vec![None; nodes.len()];
         for i in 0..nodes.len() {
@@ -37,17 +45,19 @@ impl Hierarchy {
             }
         }
         let mut world_from_node = vec![DAffine3::IDENTITY; nodes.len()];
+        let mut is_hidden = vec![false; nodes.len()];
         let mut reached = 0;
         let roots = || (0..nodes.len()).filter(|&i| parent[i].is_none());
         let mut open: Vec<usize> = roots().collect();
         while let Some(i) = open.pop() {
             reached += 1;
             let above = parent[i].map_or(DAffine3::IDENTITY, |p| world_from_node[p]);
-            let world = above * local(document, i)?;
+            let world = above * local(document, i, notices)?;
             if world.to_cols_array().iter().any(|c| !c.is_finite() || c.abs() > LARGEST) {
                 return Err(document.invalid(&format!("nodes[{i}]"), "its transform overflows"));
             }
             world_from_node[i] = world;
+            is_hidden[i] = hides_itself(document, i)? || parent[i].is_some_and(|p| is_hidden[p]);
             open.extend(children(i));
         }
         if reached < nodes.len() {
@@ -76,23 +86,50 @@ impl Hierarchy {
                 open[first..].reverse();
             }
         }
-        Ok(Self { world_from_node, shown })
+        Ok(Self { world_from_node, is_hidden, shown })
     }
 }
 
-fn local(document: &Document, i: usize) -> Result<DAffine3, SceneError> {
+/// Whether a node is hidden by its own `KHR_node_visibility`.
+fn hides_itself(document: &Document, i: usize) -> Result<bool, SceneError> {
+    let extensions = document.root.nodes[i].extensions.as_ref();
+    let visible = extensions.and_then(|e| e.others.get("KHR_node_visibility")?.get("visible"));
+    let Some(visible) = visible else { return Ok(false) };
+    let place = || format!("nodes[{i}].extensions.KHR_node_visibility.visible");
+    let invalid = || document.invalid(&place(), "must be true or false");
+    visible.as_bool().map(|visible| !visible).ok_or_else(invalid)
+}
+
+/// The affine transform that a file's matrix stands for.
+///
+/// # Errors
+/// An entry is not finite, or the last row is not 0, 0, 0, 1 up to rounding.
+pub(super) fn affine(
+    document: &Document,
+    matrix: [f32; 16],
+    place: &str,
+    notices: &mut Notices,
+) -> Result<DAffine3, SceneError> {
+    let m = DMat4::from_cols_array(&matrix.map(f64::from));
+    if !m.is_finite() {
+        return Err(document.invalid(place, "has entries that are not finite"));
+    }
+    let dust = m.row(3).distance(glam::DVec4::W);
+    if dust > DUST {
+        return Err(document.invalid(place, "is not affine: its last row must be 0, 0, 0, 1"));
+    }
+    if dust > 0.0 {
+        notices.add(place, "its last row is off by rounding, 0, 0, 0, 1 instead");
+    }
+    Ok(DAffine3::from_mat4(m))
+}
+
+fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine3, SceneError> {
     let node = &document.root.nodes[i];
     let fail =
         |field: &str, problem: &str| Err(document.invalid(&format!("nodes[{i}].{field}"), problem));
     if let Some(m) = node.matrix {
-        let m = DMat4::from_cols_array(&m.map(f64::from));
-        if !m.is_finite() {
-            return fail("matrix", "has entries that are not finite");
-        }
-        if m.row(3).distance(glam::DVec4::W) > 1e-6 {
-            return fail("matrix", "is not affine: its last row must be 0, 0, 0, 1");
-        }
-        return Ok(DAffine3::from_mat4(m));
+        return affine(document, m, &format!("nodes[{i}].matrix"), notices);
     }
     let vector =
         |v: Option<[f32; 3]>, default| v.map_or(default, |v| DVec3::from(v.map(f64::from)));

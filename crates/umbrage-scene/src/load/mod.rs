@@ -1,21 +1,27 @@
 //! Loads glTF 2.0 files.
 
 mod accessor;
+mod budget;
 mod cameras_and_lights;
 mod document;
+mod extensions;
 mod hierarchy;
+mod instancing;
 mod material;
 mod primitive;
 mod skin;
 mod uri;
 
 use crate::error::SceneError;
-use crate::types::{Instance, Mesh, Scene};
+use crate::types::{Alpha, Instance, Scene};
+use budget::Budget;
 use document::{Document, Notices};
-use glam::{DAffine3, DMat3, DQuat, DVec3};
-use gltf::json::{Index, Node};
+use glam::{DAffine3, DMat3};
+use gltf::json::Index;
 use hierarchy::{Hierarchy, LARGEST};
+use instancing::Copies;
 use material::Materials;
+use primitive::Wanted;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use umbrage::Aabb;
@@ -23,35 +29,63 @@ use umbrage::Aabb;
 /// Largest distance of a position from the origin, metres. The planner has the same limit.
 const WORLD_END: f64 = 1e12;
 
+/// The memory that [`load`] lets a scene take, bytes: 2 GiB. That is enough for twenty million
+/// instances, forty million triangles, or two images of 16 384 × 16 384 pixels less what else there
+/// is.
+pub const SCENE_BYTES: u64 = 2 << 30;
+
 /// Reads a scene from a `.gltf` or `.glb` file; the content tells which of the two it is.
 ///
-/// The file's default scene is loaded in the pose that its nodes have: skins are applied,
-/// animations are not played. It consists of triangles with base colour, `MASK` alpha and normals,
-/// of cameras, and of the lights of `KHR_lights_punctual`. Each primitive is stored once and drawn
-/// by instances, including those of `EXT_mesh_gpu_instancing`. Buffers and images are read from the
-/// file itself, from data URIs, and from files below the scene's folder.
+/// The file's default scene is loaded in the pose that its nodes have: skins and the default weights
+/// of morph targets are applied, animations are not played. It consists of triangles with base
+/// colour, `MASK` alpha (of factor, texture and vertices) and normals, of cameras, and of the lights
+/// of `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, including those
+/// of `EXT_mesh_gpu_instancing`. Nodes that `KHR_node_visibility` hides are left out, with all below
+/// them but their cameras. Textures are PNG or JPEG images with the transform of
+/// `KHR_texture_transform`; they are interpolated as their sampler's `magFilter` says, without mip
+/// levels. Buffers and images are read from the file itself, from data URIs, and from regular files
+/// below the scene's folder.
 ///
-/// The following repairs are made, each with a notice in [`Scene::notices`]:
+/// The following repairs are made, each kind with a notice in [`Scene::notices`]:
 ///
 /// - Points and lines are left out.
 /// - Missing normals are computed.
 /// - Nodes whose transforms flatten their meshes are left out.
-/// - Materials whose image is missing or invalid are plain.
+/// - Materials whose image is missing, invalid, too large, or of an unknown format are plain.
 /// - Translucent (`BLEND`) materials are solid where alpha is at least one half and absent
-///   elsewhere.
+///   elsewhere. Those that transmit light are solid.
+/// - Positions that are not finite are left out if no triangle uses them.
+/// - Matrices whose last row is off by rounding, and a byte order mark, are put right.
 /// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
-/// Vertex colours, morph targets and orthographic cameras are not supported and are left out, also
-/// with a notice.
+/// Vertex colours, textures other than that of the base colour, animations, scenes other than the
+/// default one and other extensions are not supported and are left out, also with a notice. Both sides of every surface show, whatever `doubleSided` says.
 ///
 /// # Errors
-/// The file cannot be read, is cut off, refers to files outside its folder, has indices out of
-/// range, positions that are not finite, nodes that do not form trees, extensions that change its
-/// geometry in unknown ways, or nothing to draw. The error names the place in the file.
+/// The file cannot be read, is cut off, refers to files outside its folder or to pipes or devices,
+/// has indices out of range, positions that are not finite, nodes that do not form trees, requires
+/// extensions that change its geometry in unknown ways, or has nothing to draw. The error names the
+/// place in the file. [`SceneError::TooLarge`] if it would take more than [`SCENE_BYTES`].
 pub fn load(path: &Path) -> Result<Scene, SceneError> {
-    let bytes = document::read_file(path)?;
-    let document = Document::parse(path, &bytes)?;
-    let hierarchy = Hierarchy::of(&document)?;
+    load_within(path, SCENE_BYTES)
+}
+
+/// Like [`load`], with another limit of the memory that the scene may take, bytes. All count
+/// together: the files, their JSON, what is read from them for a while, and the scene's vertices,
+/// triangles, instances and pixels. What cannot become large without these is not counted.
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_within(path: &Path, limit: u64) -> Result<Scene, SceneError> {
+    let budget = Budget::new(path, limit);
+    let bytes = document::read_file(path, &budget, "file")?;
+    let document = Document::parse(path, &bytes, budget)?;
+    let mut notices = Notices::default();
+    if document.has_byte_order_mark {
+        notices.add("JSON", "begins with a byte order mark, which is skipped");
+    }
+    note_unread(&document, &mut notices);
+    let hierarchy = Hierarchy::of(&document, &mut notices)?;
     let mut loader = Loader {
         document: &document,
         hierarchy: &hierarchy,
@@ -61,7 +95,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
             name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             ..Scene::default()
         },
-        notices: Notices::default(),
+        notices,
     };
     for &node in &hierarchy.shown {
         loader.load_mesh(node)?;
@@ -79,49 +113,83 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// # Errors
 /// The scene file cannot be read or is not glTF 2.0.
 pub fn files(path: &Path) -> Result<Vec<PathBuf>, SceneError> {
-    let bytes = document::read_file(path)?;
+    let budget = Budget::new(path, SCENE_BYTES);
+    let bytes = document::read_file(path, &budget, "file")?;
     let mut files = vec![path.to_owned()];
-    files.extend(Document::parse(path, &bytes)?.referred_files());
+    files.extend(Document::parse(path, &bytes, budget)?.referred_files());
     Ok(files)
+}
+
+/// Notes what of a file is never read.
+fn note_unread(document: &Document, notices: &mut Notices) {
+    extensions::note_unread(document, notices);
+    for i in 0..document.root.animations.len() {
+        notices.add(format!("animations[{i}]"), "not played, nodes stay in the pose they have");
+    }
+    let shown = document.root.scene.map_or(0, |scene| scene.value());
+    for i in (0..document.root.scenes.len()).filter(|&i| i != shown) {
+        notices.add(format!("scenes[{i}]"), "left out, only the default scene is shown");
+    }
 }
 
 struct Loader<'a> {
     document: &'a Document<'a>,
     hierarchy: &'a Hierarchy,
     materials: Materials,
-    /// For each glTF mesh that has been loaded, the indices of the scene meshes made from it.
-    loaded: HashMap<usize, Vec<usize>>,
+    /// For each glTF mesh that has been loaded, and the bits of the weights that it was morphed by,
+    /// the indices of the scene meshes made from it.
+    loaded: HashMap<(usize, Vec<u32>), Vec<usize>>,
     scene: Scene,
     notices: Notices,
 }
 
 impl Loader<'_> {
     fn load_mesh(&mut self, index: usize) -> Result<(), SceneError> {
-        let node = &self.document.root.nodes[index];
-        let Some(mesh) = node.mesh else { return Ok(()) };
+        let (document, hierarchy) = (self.document, self.hierarchy);
+        let node = &document.root.nodes[index];
+        let Some(mesh) = node.mesh.filter(|_| !hierarchy.is_hidden[index]) else { return Ok(()) };
         let place = format!("nodes[{index}]");
-        let morphs = node.weights.iter().flatten();
-        if morphs
-            .chain(self.document.get(mesh, &place)?.weights.iter().flatten())
-            .any(|&w| w != 0.0)
-        {
-            self.notices.add(&place, "morph targets are not applied");
-        }
+        let json = document.get(mesh, &place)?;
+        let weights = node.weights.as_ref().or(json.weights.as_ref());
+        let weights = weights.map_or(&[][..], Vec::as_slice);
         if let Some(skin) = node.skin {
-            let joints = skin::joint_matrices(self.document, skin, self.hierarchy)?;
-            return self.load_skinned(mesh, &joints);
+            let taken = document.budget.taken();
+            let joints = skin::joint_matrices(document, skin, hierarchy, &mut self.notices)?;
+            document.budget.give_back_to(taken);
+            if Copies::count(document, node, &place)?.is_some() {
+                self.notices
+                    .add(&place, "instances of a skinned mesh are not supported, drawn once");
+            }
+            let posed = self.load_primitives(mesh, weights, Some(&joints))?;
+            let instances =
+                posed.into_iter().map(|(mesh, world_from_mesh)| Instance { mesh, world_from_mesh });
+            let list = &mut self.scene.instances;
+            document.budget.grow(&place, list, instances.len() as u64, "instances")?;
+            list.extend(instances);
+            return Ok(());
         }
-        let meshes = match self.loaded.get(&mesh.value()) {
+        let key = (mesh.value(), weights.iter().map(|w| w.to_bits()).collect());
+        let meshes = match self.loaded.get(&key) {
             Some(found) => found.clone(),
             None => {
-                let made = self.load_primitives(mesh, |_, _, _| Ok(()))?;
-                self.loaded.insert(mesh.value(), made.clone());
+                let made = self.load_primitives(mesh, weights, None)?;
+                let made: Vec<usize> = made.into_iter().map(|(mesh, _)| mesh).collect();
+                self.loaded.insert(key, made.clone());
                 made
             }
         };
-        let world_from_node = self.hierarchy.world_from_node[index];
-        for node_from_copy in self.copies(node, &place)? {
-            let world_from_mesh = world_from_node * node_from_copy;
+        let world_from_node = hierarchy.world_from_node[index];
+        let count = Copies::count(document, node, &place)?;
+        let instances = count.unwrap_or(1).saturating_mul(meshes.len() as u64);
+        document.budget.grow(&place, &mut self.scene.instances, instances, "instances")?;
+        let taken = document.budget.taken();
+        let load = |count| Copies::load(document, node, &place, count as usize);
+        let copies = count.map(load).transpose()?;
+        for i in 0..count.unwrap_or(1) as usize {
+            let world_from_mesh = match &copies {
+                Some(copies) => world_from_node * copies.node_from_copy(document, i)?,
+                None => world_from_node,
+            };
             if is_flat(world_from_mesh.matrix3) {
                 self.notices.add(&place, "its transform flattens its mesh, left out");
                 continue;
@@ -129,126 +197,56 @@ impl Loader<'_> {
             let place = |&mesh: &usize| Instance { mesh, world_from_mesh };
             self.scene.instances.extend(meshes.iter().map(place));
         }
+        document.budget.give_back_to(taken);
         Ok(())
     }
 
-    /// Loads a skinned mesh. Each node that draws it gets a mesh of its own, because its shape
-    /// depends on the node's pose.
-    fn load_skinned(
-        &mut self,
-        mesh: Index<gltf::json::Mesh>,
-        joints: &[DAffine3],
-    ) -> Result<(), SceneError> {
-        let mut origins = Vec::new();
-        let document = self.document;
-        let made = self.load_primitives(mesh, |this, mesh, (json, place)| {
-            let world_from_mesh = match primitive::load_binding(document, json, place)? {
-                Some(b) => skin::pose(document, mesh, &b, joints, place, &mut this.notices)?,
-                None => {
-                    this.notices
-                        .add(place, "has a skin but no joints or weights, shown without the skin");
-                    DAffine3::IDENTITY
-                }
-            };
-            origins.push(world_from_mesh);
-            Ok(())
-        })?;
-        let place = |(mesh, world_from_mesh)| Instance { mesh, world_from_mesh };
-        self.scene.instances.extend(made.into_iter().zip(origins).map(place));
-        Ok(())
-    }
-
-    /// Adds the primitives of a mesh to the scene, after `finish` was applied to each. Returns
-    /// their indices.
+    /// Adds the primitives of a mesh to the scene, in the pose of the joints if there are any.
+    /// Returns their indices, and the transform to the world that the pose gives them: a mesh is
+    /// loaded for each node that draws it with a skin, because its shape depends on the pose.
     fn load_primitives(
         &mut self,
         mesh: Index<gltf::json::Mesh>,
-        mut finish: impl FnMut(
-            &mut Self,
-            &mut Mesh,
-            (&gltf::json::mesh::Primitive, &str),
-        ) -> Result<(), SceneError>,
-    ) -> Result<Vec<usize>, SceneError> {
+        morph_weights: &[f32],
+        joints: Option<&[DAffine3]>,
+    ) -> Result<Vec<(usize, DAffine3)>, SceneError> {
         let document = self.document;
         let json = document.get(mesh, "nodes")?;
         let mut made = Vec::with_capacity(json.primitives.len());
         for (i, primitive) in json.primitives.iter().enumerate() {
             let place = format!("meshes[{}].primitives[{i}]", mesh.value());
-            let (material, coords) =
+            let (material, tex_coords) =
                 self.materials.load(document, primitive.material, &place, &mut self.notices)?;
-            let loaded =
-                primitive::load(document, primitive, &place, material, coords, &mut self.notices)?;
-            if let Some(mut loaded) = loaded {
-                finish(self, &mut loaded, (primitive, &place))?;
-                primitive::drop_unused_vertices(&mut loaded);
-                made.push(self.scene.meshes.len());
-                self.scene.meshes.push(loaded);
-            }
+            let wanted = Wanted {
+                material,
+                tex_coords,
+                is_masked: self.materials.materials[material].alpha != Alpha::Opaque,
+                morph_weights,
+                is_skinned: joints.is_some(),
+            };
+            let taken = document.budget.taken();
+            let loaded = primitive::load(document, primitive, &place, &wanted, &mut self.notices)?;
+            document.budget.give_back_to(taken);
+            let Some(mut loaded) = loaded else { continue };
+            let mesh = &mut loaded.mesh;
+            document.budget.take(&place, 1, "mesh", mesh.bytes())?;
+            document.budget.grow(&place, &mut self.scene.meshes, 1, "meshes")?;
+            let world_from_mesh = match joints {
+                Some(joints) if !loaded.influences.is_empty() => {
+                    let influences = &loaded.influences;
+                    skin::pose(document, mesh, influences, joints, &place, &mut self.notices)?
+                }
+                Some(_) => {
+                    self.notices
+                        .add(&place, "has a skin but no joints or weights, shown without the skin");
+                    DAffine3::IDENTITY
+                }
+                None => DAffine3::IDENTITY,
+            };
+            made.push((self.scene.meshes.len(), world_from_mesh));
+            self.scene.meshes.push(loaded.mesh);
         }
         Ok(made)
-    }
-
-    /// The transforms at which a node draws its mesh, in the node's space: the identity alone, or
-    /// those of `EXT_mesh_gpu_instancing`.
-    fn copies(&self, node: &Node, place: &str) -> Result<Vec<DAffine3>, SceneError> {
-        let extension =
-            node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
-        let Some(attributes) = extension.map(|e| &e["attributes"]) else {
-            return Ok(vec![DAffine3::IDENTITY]);
-        };
-        let place = format!("{place}.extensions.EXT_mesh_gpu_instancing");
-        let id = |name: &str| {
-            let value = &attributes[name];
-            let index = value.as_u64().and_then(|i| u32::try_from(i).ok()).map(Index::new);
-            match index {
-                None if !value.is_null() => Err(self
-                    .document
-                    .invalid(&place, format!("{name} must be an accessor's index"))),
-                index => Ok(index),
-            }
-        };
-        let vectors =
-            |name: &str| id(name)?.map(|i| self.document.floats::<3>(i, &place)).transpose();
-        let (translations, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
-        let rotations =
-            id("ROTATION")?.map(|i| self.document.floats::<4>(i, &place)).transpose()?;
-        let counts = [
-            translations.as_ref().map(Vec::len),
-            scales.as_ref().map(Vec::len),
-            rotations.as_ref().map(Vec::len),
-        ];
-        let Some(n) = counts.into_iter().flatten().next() else {
-            // The extension has only custom attributes, so all of its copies coincide with the
-            // node.
-            return Ok(vec![DAffine3::IDENTITY]);
-        };
-        if counts.into_iter().flatten().any(|other| other != n) {
-            return Err(self
-                .document
-                .invalid(&place, "its attributes have different numbers of elements"));
-        }
-        let vector = |values: &Option<Vec<[f32; 3]>>, i: usize, default| {
-            values.as_ref().map_or(default, |v| DVec3::from(v[i].map(f64::from)))
-        };
-        let copy = |i: usize| {
-            let rotation = rotations
-                .as_ref()
-                .map_or(DQuat::IDENTITY, |v| DQuat::from_array(v[i].map(f64::from)));
-            let t = DAffine3::from_scale_rotation_translation(
-                vector(&scales, i, DVec3::ONE),
-                // A quaternion of zero length becomes non-finite here, and the transform is then
-                // refused.
-                rotation * (1.0 / rotation.length()),
-                vector(&translations, i, DVec3::ZERO),
-            );
-            match t.is_finite() {
-                true => Ok(t),
-                false => Err(self
-                    .document
-                    .invalid(&place, format!("the transform of instance {i} is not finite"))),
-            }
-        };
-        (0..n).map(copy).collect()
     }
 
     /// The box around the scene.
@@ -285,7 +283,7 @@ impl Loader<'_> {
             self.scene.cameras.extend(camera);
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
-        if let Some(light) = light {
+        if let Some(light) = light.filter(|_| !self.hierarchy.is_hidden[index]) {
             let (index, notices) = (light.light.value(), &mut self.notices);
             let light =
                 cameras_and_lights::load_light(self.document, index, name, world, bounds, notices)?;

@@ -2,22 +2,50 @@ use super::document::{Document, Notices};
 use super::material::TexCoords;
 use crate::error::SceneError;
 use crate::types::Mesh;
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
-/// For each vertex, four joints and their weights.
-pub(super) struct Binding {
-    pub(super) joints: Vec<[u32; 4]>,
-    pub(super) weights: Vec<[f32; 4]>,
+/// What of a primitive is needed, which depends on its material and on the node that draws it.
+pub(super) struct Wanted<'a> {
+    /// Index of the material in the scene.
+    pub(super) material: usize,
+    pub(super) tex_coords: Option<TexCoords>,
+    /// Whether the vertices' alpha matters.
+    pub(super) is_masked: bool,
+    /// Weights of the morph targets; those that are missing count as 0.
+    pub(super) morph_weights: &'a [f32],
+    pub(super) is_skinned: bool,
 }
 
-pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<Accessor>> {
+/// The triangles of a primitive, and the joints that move them.
+pub(super) struct Loaded {
+    pub(super) mesh: Mesh,
+    /// One for each of the sets `JOINTS_0`, `JOINTS_1`, …; empty if the mesh is not skinned.
+    pub(super) influences: Vec<Influences>,
+}
+
+/// For each vertex, four of the joints that move it, and their weights.
+pub(super) struct Influences {
+    joints: Vec<[u32; 4]>,
+    weights: Vec<[f32; 4]>,
+}
+
+impl Influences {
+    /// The joints that move a vertex, with their weights.
+    pub(super) fn of_vertex(&self, i: usize) -> impl Iterator<Item = (u32, f32)> {
+        self.joints[i].into_iter().zip(self.weights[i]).filter(|(_, weight)| *weight != 0.0)
+    }
+}
+
+fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<Accessor>> {
     primitive.attributes.get(&Checked::Valid(semantic)).copied()
 }
 
-/// The triangles of a primitive in its mesh's space; `None` if it has none.
+/// The triangles of a primitive in its mesh's space, morphed but not yet in the pose of its skin,
+/// with those vertices alone that triangles use; `None` if it has no triangles.
 ///
 /// Data that glTF leaves to the reader, or that exporters often get wrong, is repaired with a
 /// notice: points and lines are left out, strips and fans become triangles, missing normals are
@@ -25,15 +53,15 @@ pub(super) fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Ind
 /// surrounding triangles' normals.
 ///
 /// # Errors
-/// A position is not finite or an index is out of range, which cannot be repaired.
+/// A position that triangles use is not finite or an index is out of range, which cannot be
+/// repaired, or the mesh is too large.
 pub(super) fn load(
     document: &Document,
     primitive: &Primitive,
     place: &str,
-    material: usize,
-    tex_coords: Option<TexCoords>,
+    wanted: &Wanted<'_>,
     notices: &mut Notices,
-) -> Result<Option<Mesh>, SceneError> {
+) -> Result<Option<Loaded>, SceneError> {
     let Checked::Valid(mode) = primitive.mode else {
         return Err(document.invalid(place, "mode is unknown, should be 0 to 6"));
     };
@@ -45,63 +73,168 @@ pub(super) fn load(
         notices.add(place, "has no positions, left out");
         return Ok(None);
     };
-    let positions = vectors(document, positions, &format!("{place}.attributes.POSITION"))?;
-    if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
-        let problem = format!("position {i} is {}, must be finite", positions[i]);
-        return Err(document.invalid(place, problem));
-    }
-    let indices = match primitive.indices {
-        Some(id) => document
-            .integers::<1>(id, &format!("{place}.indices"))?
-            .into_iter()
-            .map(|[i]| i)
-            .collect(),
-        None => (0..positions.len() as u32).collect::<Vec<_>>(),
-    };
-    let triangles = triangles(mode, &indices);
-    if mode == Mode::Triangles && indices.len() % 3 != 0 {
-        notices.add(place, "the last triangle has fewer than three corners, left out");
-    }
-    if let Some(k) = indices.iter().position(|&i| i as usize >= positions.len()) {
-        let (i, n) = (indices[k], positions.len());
-        let problem = format!("index {k} is {i}, there are {n} positions");
-        return Err(document.invalid(&format!("{place}.indices"), problem));
-    }
+    note_unread(primitive, place, wanted, notices);
+    let mut positions = vectors(document, positions, &format!("{place}.attributes.POSITION"))?;
+    morph(document, primitive, place, wanted, Moved::Positions, &mut positions)?;
+    let triangles = load_triangles(document, primitive, mode, place, &positions, notices)?;
     if triangles.is_empty() {
         notices.add(place, "has no triangles, left out");
         return Ok(None);
     }
-    let normals = match attribute(primitive, Semantic::Normals) {
+    if let Some(&i) = triangles.iter().flatten().find(|&&i| !positions[i as usize].is_finite()) {
+        let problem = format!("position {i} is {}, must be finite", positions[i as usize]);
+        return Err(document.invalid(place, problem));
+    }
+    let mut normals = match attribute(primitive, Semantic::Normals) {
         Some(id) => vectors(document, id, &format!("{place}.attributes.NORMAL"))?,
         None => Vec::new(),
     };
-    let uvs = match tex_coords {
+    if !normals.is_empty() {
+        morph(document, primitive, place, wanted, Moved::Normals, &mut normals)?;
+    }
+    let uvs = match wanted.tex_coords {
         Some(coords) => load_uvs(document, primitive, place, coords, notices)?,
         None => Vec::new(),
     };
+    let alphas = load_alphas(document, primitive, place, wanted, notices)?;
+    let influences = match wanted.is_skinned {
+        true => load_influences(document, primitive, place, notices)?,
+        false => Vec::new(),
+    };
     let n = positions.len();
-    for (what, found) in [("normals", normals.len()), ("texture coordinates", uvs.len())] {
-        if found != n && found != 0 {
+    let joints = influences.iter().map(|set| ("joints", set.joints.len()));
+    let weights = influences.iter().map(|set| ("joint weights", set.weights.len()));
+    let lists =
+        [("normals", normals.len()), ("texture coordinates", uvs.len()), ("colours", alphas.len())];
+    for (what, found) in lists.into_iter().filter(|l| l.1 > 0).chain(joints).chain(weights) {
+        if found != n {
             return Err(document.invalid(place, format!("has {n} positions but {found} {what}")));
         }
     }
-    if attribute(primitive, Semantic::Colors(0)).is_some() {
-        notices.add(place, "vertex colours are not shown");
-    }
 
-    let mut mesh = Mesh { positions, normals, uvs, triangles, material };
+    let material = wanted.material;
+    let mesh = Mesh { positions, normals, uvs, alphas, triangles, material };
+    let mut loaded = Loaded { mesh, influences };
+    document.budget.take(place, n as u64, "vertices", size_of::<u32>() + size_of::<usize>())?;
+    drop_unused_vertices(&mut loaded, place, notices);
+    let mesh = &mut loaded.mesh;
     if mesh.normals.is_empty() {
         notices.add(place, "has no normals, shaded flat");
-        shade_flat(&mut mesh);
+        let corners = 3 * mesh.triangles.len() as u64;
+        document.budget.take(place, corners, "corners", BYTES_PER_CORNER)?;
+        shade_flat(&mut loaded);
     } else {
-        let repaired = repair_normals(&mut mesh);
+        let repaired = repair_normals(mesh);
         notices.add_some(
             place,
             repaired,
             "normals without a direction, computed from the triangles around",
         );
     }
-    Ok(Some(mesh))
+    Ok(Some(loaded))
+}
+
+/// Largest memory that a corner of a flat triangle takes, bytes: position, normal, texture
+/// coordinates and alpha, and joints with their weights.
+const BYTES_PER_CORNER: usize = 2 * size_of::<Vec3>()
+    + size_of::<Vec2>()
+    + size_of::<f32>()
+    + size_of::<[u32; 4]>()
+    + size_of::<[f32; 4]>();
+
+/// Notes attributes that are not used.
+fn note_unread(primitive: &Primitive, place: &str, wanted: &Wanted<'_>, notices: &mut Notices) {
+    let has = |test: fn(&Checked<Semantic>) -> bool| primitive.attributes.keys().any(test);
+    if has(|key| matches!(key, Checked::Valid(Semantic::Colors(set)) if *set > 0)) {
+        notices.add(place, "has several sets of vertex colours, only the first counts");
+    }
+    if has(|key| matches!(key, Checked::Invalid)) {
+        notices.add(place, "has attributes of its application's own, which are not used");
+    }
+    if !wanted.is_skinned && has(|key| matches!(key, Checked::Valid(Semantic::Joints(_)))) {
+        notices.add(place, "has joints, but its node has no skin, shown as it is");
+    }
+    let targets = primitive.targets.as_ref().map_or(0, Vec::len);
+    if targets != wanted.morph_weights.len() && !wanted.morph_weights.is_empty() {
+        notices.add(place, "has not one weight for each morph target, missing ones count as 0");
+    }
+}
+
+/// The triangles of a primitive, all with the same winding, and all indices in range.
+fn load_triangles(
+    document: &Document,
+    primitive: &Primitive,
+    mode: Mode,
+    place: &str,
+    positions: &[Vec3],
+    notices: &mut Notices,
+) -> Result<Vec<[u32; 3]>, SceneError> {
+    let count = positions.len();
+    let place_of_indices = format!("{place}.indices");
+    let indices = match primitive.indices {
+        Some(id) => document.integers::<1>(id, &place_of_indices)?,
+        None => {
+            document.budget.take(place, count as u64, "indices", size_of::<u32>())?;
+            (0..count as u32).map(|i| [i]).collect()
+        }
+    };
+    let indices = indices.as_flattened();
+    if mode == Mode::Triangles && indices.len() % 3 != 0 {
+        notices.add(place, "the last triangle has fewer than three corners, left out");
+    }
+    if let Some(k) = indices.iter().position(|&i| i as usize >= count) {
+        let problem = format!("index {k} is {}, there are {count} positions", indices[k]);
+        return Err(document.invalid(&place_of_indices, problem));
+    }
+    let most = if mode == Mode::Triangles { indices.len() / 3 } else { indices.len() };
+    document.budget.take(place, most as u64, "triangles", size_of::<[u32; 3]>())?;
+    let mut triangles = triangles(mode, indices);
+    // Triangles that use a vertex twice link strips and draw nothing, so their positions may be
+    // anything.
+    let is_finite = |&i: &u32| positions[i as usize].is_finite();
+    triangles.retain(|t| {
+        let [a, b, c] = *t;
+        (a != b && b != c && c != a) || t.iter().all(is_finite)
+    });
+    Ok(triangles)
+}
+
+/// What a morph target moves.
+#[derive(Clone, Copy)]
+enum Moved {
+    Positions,
+    Normals,
+}
+
+/// Adds the displacements of a primitive's morph targets, by their weights.
+fn morph(
+    document: &Document,
+    primitive: &Primitive,
+    place: &str,
+    wanted: &Wanted<'_>,
+    moved: Moved,
+    values: &mut [Vec3],
+) -> Result<(), SceneError> {
+    let targets = primitive.targets.iter().flatten().zip(wanted.morph_weights).enumerate();
+    for (k, (target, &weight)) in targets.filter(|(_, (_, weight))| **weight != 0.0) {
+        let (id, name) = match moved {
+            Moved::Positions => (target.positions, "POSITION"),
+            Moved::Normals => (target.normals, "NORMAL"),
+        };
+        let Some(id) = id else { continue };
+        let place = format!("{place}.targets[{k}].{name}");
+        let taken = document.budget.taken();
+        let steps = vectors(document, id, &place)?;
+        if steps.len() != values.len() {
+            let problem = format!("has {} elements for {} vertices", steps.len(), values.len());
+            return Err(document.invalid(&place, problem));
+        }
+        for (value, step) in values.iter_mut().zip(steps) {
+            *value = (value.as_dvec3() + step.as_dvec3() * f64::from(weight)).as_vec3();
+        }
+        document.budget.give_back_to(taken);
+    }
+    Ok(())
 }
 
 /// Texture coordinates of a primitive, transformed for its material; empty if it has none.
@@ -128,20 +261,60 @@ fn load_uvs(
     Ok(uvs)
 }
 
-/// The joints and weights of a primitive's vertices; `None` if the primitive lacks either.
-pub(super) fn load_binding(
+/// The alpha of a primitive's vertices; empty if it does not matter or is 1 everywhere. The colours
+/// themselves are not read.
+fn load_alphas(
     document: &Document,
     primitive: &Primitive,
     place: &str,
-) -> Result<Option<Binding>, SceneError> {
-    let joints = attribute(primitive, Semantic::Joints(0));
-    let weights = attribute(primitive, Semantic::Weights(0));
-    let Some((joints, weights)) = joints.zip(weights) else {
-        return Ok(None);
-    };
-    let joints = document.integers::<4>(joints, &format!("{place}.attributes.JOINTS_0"))?;
-    let weights = document.floats::<4>(weights, &format!("{place}.attributes.WEIGHTS_0"))?;
-    Ok(Some(Binding { joints, weights }))
+    wanted: &Wanted<'_>,
+    notices: &mut Notices,
+) -> Result<Vec<f32>, SceneError> {
+    let Some(id) = attribute(primitive, Semantic::Colors(0)) else { return Ok(Vec::new()) };
+    let place_of_colors = format!("{place}.attributes.COLOR_0");
+    let has_alpha = document.get(id, &place_of_colors)?.type_ == Checked::Valid(Type::Vec4);
+    if !(wanted.is_masked && has_alpha) {
+        notices.add(place, "vertex colours are not shown");
+        return Ok(Vec::new());
+    }
+    let colors = document.floats::<4>(id, &place_of_colors)?;
+    if colors.iter().any(|[r, g, b, _]| [r, g, b].iter().any(|c| **c != 1.0)) {
+        notices.add(place, "vertex colours are not shown, only their alpha is used");
+    }
+    let broken = colors.iter().filter(|[.., alpha]| !alpha.is_finite()).count();
+    notices.add_some(place_of_colors, broken, "alphas of vertices are not finite, 1 instead");
+    let alpha =
+        |&[.., alpha]: &[f32; 4]| if alpha.is_finite() { alpha.clamp(0.0, 1.0) } else { 1.0 };
+    let alphas: Vec<f32> = colors.iter().map(alpha).collect();
+    Ok(if alphas.iter().all(|&a| a == 1.0) { Vec::new() } else { alphas })
+}
+
+/// The joints and weights of a primitive's vertices, set by set.
+fn load_influences(
+    document: &Document,
+    primitive: &Primitive,
+    place: &str,
+    notices: &mut Notices,
+) -> Result<Vec<Influences>, SceneError> {
+    let mut sets = Vec::new();
+    for set in 0.. {
+        let joints = attribute(primitive, Semantic::Joints(set));
+        let weights = attribute(primitive, Semantic::Weights(set));
+        match (joints, weights) {
+            (Some(joints), Some(weights)) => {
+                let place = |name: &str| format!("{place}.attributes.{name}_{set}");
+                sets.push(Influences {
+                    joints: document.integers::<4>(joints, &place("JOINTS"))?,
+                    weights: document.floats::<4>(weights, &place("WEIGHTS"))?,
+                });
+            }
+            (None, None) => break,
+            _ => {
+                notices.add(place, "has joints without weights or weights without joints, left out")
+            }
+        }
+    }
+    Ok(sets)
 }
 
 fn vectors(document: &Document, id: Index<Accessor>, place: &str) -> Result<Vec<Vec3>, SceneError> {
@@ -164,24 +337,22 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
 
 /// The triangle's normal with twice its area as length, in double precision so that it is zero only
 /// for triangles without area.
-fn area_normal(positions: &[Vec3], triangle: [u32; 3]) -> glam::DVec3 {
+fn area_normal(positions: &[Vec3], triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3());
     (b - a).cross(c - a)
 }
 
 /// Gives every triangle corners of its own, which have the triangle's normal.
-pub(super) fn shade_flat(mesh: &mut Mesh) {
-    let corners = || mesh.triangles.iter().flatten().map(|&i| i as usize);
+fn shade_flat(loaded: &mut Loaded) {
+    let mesh = &loaded.mesh;
     let normals = mesh.triangles.iter().flat_map(|&t| {
-        let n = area_normal(&mesh.positions, t).normalize_or(glam::DVec3::Y);
+        let n = area_normal(&mesh.positions, t).normalize_or(DVec3::Y);
         [n.as_vec3(); 3]
     });
     let normals = normals.collect();
-    let positions = corners().map(|i| mesh.positions[i]).collect();
-    if !mesh.uvs.is_empty() {
-        mesh.uvs = corners().map(|i| mesh.uvs[i]).collect();
-    }
-    mesh.positions = positions;
+    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|&i| i as usize).collect();
+    loaded.take_vertices(&corners);
+    let mesh = &mut loaded.mesh;
     mesh.normals = normals;
     for (k, t) in mesh.triangles.iter_mut().enumerate() {
         *t = [0, 1, 2].map(|c| 3 * k as u32 + c);
@@ -189,34 +360,54 @@ pub(super) fn shade_flat(mesh: &mut Mesh) {
 }
 
 /// Removes the vertices that no triangle uses, because files may let all primitives share one large
-/// array.
-pub(super) fn drop_unused_vertices(mesh: &mut Mesh) {
-    let mut used = vec![false; mesh.positions.len()];
+/// array, and because nothing need be right about them.
+fn drop_unused_vertices(loaded: &mut Loaded, place: &str, notices: &mut Notices) {
+    let mesh = &mut loaded.mesh;
+    let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &i in mesh.triangles.iter().flatten() {
-        used[i as usize] = true;
+        new_index[i as usize] = 0;
     }
-    if used.iter().all(|&u| u) {
+    let mut kept = Vec::new();
+    let mut broken = 0;
+    for (i, new_index) in new_index.iter_mut().enumerate() {
+        if *new_index == 0 {
+            *new_index = kept.len() as u32;
+            kept.push(i);
+        } else {
+            broken += usize::from(!mesh.positions[i].is_finite());
+        }
+    }
+    notices.add_some(place, broken, "positions that no triangle uses are not finite, left out");
+    if kept.len() == mesh.positions.len() {
         return;
     }
-    let mut kept = 0;
-    let new_index: Vec<u32> = used
-        .iter()
-        .map(|&used| {
-            kept += u32::from(used);
-            kept - u32::from(used)
-        })
-        .collect();
     for i in mesh.triangles.iter_mut().flatten() {
         *i = new_index[*i as usize];
     }
-    mesh.positions = keep(&mesh.positions, &used);
-    mesh.normals = keep(&mesh.normals, &used);
-    mesh.uvs = keep(&mesh.uvs, &used);
+    loaded.take_vertices(&kept);
 }
 
-/// The values of the used vertices; empty for an empty list.
-fn keep<T: Copy>(values: &[T], used: &[bool]) -> Vec<T> {
-    values.iter().zip(used).filter(|(_, used)| **used).map(|(value, _)| *value).collect()
+impl Loaded {
+    /// Replaces the vertices by those with the given indices, in that order. The triangles' indices
+    /// are left alone.
+    fn take_vertices(&mut self, indices: &[usize]) {
+        let Self { mesh, influences } = self;
+        take(&mut mesh.positions, indices);
+        take(&mut mesh.normals, indices);
+        take(&mut mesh.uvs, indices);
+        take(&mut mesh.alphas, indices);
+        for set in influences {
+            take(&mut set.joints, indices);
+            take(&mut set.weights, indices);
+        }
+    }
+}
+
+/// Replaces values by those with the given indices; leaves an empty list empty.
+fn take<T: Copy>(values: &mut Vec<T>, indices: &[usize]) {
+    if !values.is_empty() {
+        *values = indices.iter().map(|&i| values[i]).collect();
+    }
 }
 
 /// Makes all normals unit vectors. Returns how many of them had no direction and were computed from
@@ -231,7 +422,7 @@ fn repair_normals(mesh: &mut Mesh) -> usize {
     }
     let count = missing.iter().filter(|&&m| m).count();
     if count > 0 {
-        let mut sums = vec![glam::DVec3::ZERO; missing.len()];
+        let mut sums = vec![DVec3::ZERO; missing.len()];
         for &t in &mesh.triangles {
             let normal = area_normal(&mesh.positions, t);
             for i in t {
@@ -239,7 +430,7 @@ fn repair_normals(mesh: &mut Mesh) -> usize {
             }
         }
         for (i, _) in missing.iter().enumerate().filter(|(_, m)| **m) {
-            mesh.normals[i] = sums[i].normalize_or(glam::DVec3::Y).as_vec3();
+            mesh.normals[i] = sums[i].normalize_or(DVec3::Y).as_vec3();
         }
     }
     count

@@ -1,9 +1,9 @@
 use super::document::{Document, Notices};
-use super::hierarchy::Hierarchy;
-use super::primitive::Binding;
+use super::hierarchy::{self, Hierarchy};
+use super::primitive::Influences;
 use crate::error::SceneError;
 use crate::types::Mesh;
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Mat4};
 use gltf::json::{Index, Skin};
 
 /// For each joint, the transform from its bind space to the world, in the pose that the nodes have.
@@ -11,12 +11,13 @@ pub(super) fn joint_matrices(
     document: &Document,
     skin: Index<Skin>,
     hierarchy: &Hierarchy,
+    notices: &mut Notices,
 ) -> Result<Vec<DAffine3>, SceneError> {
     let place = format!("skins[{}]", skin.value());
     let json = document.get(skin, &place)?;
     let inverse_binds = match json.inverse_bind_matrices {
         Some(id) => document.floats::<16>(id, &format!("{place}.inverseBindMatrices"))?,
-        None => vec![DMat4::IDENTITY.as_mat4().to_cols_array(); json.joints.len()],
+        None => vec![Mat4::IDENTITY.to_cols_array(); json.joints.len()],
     };
     if inverse_binds.len() < json.joints.len() {
         let (m, j) = (inverse_binds.len(), json.joints.len());
@@ -24,16 +25,13 @@ pub(super) fn joint_matrices(
             document.invalid(&place, format!("has {m} inverse bind matrices for {j} joints"))
         );
     }
+    document.budget.take(&place, json.joints.len() as u64, "joints", size_of::<DAffine3>())?;
     let joint = |(joint, inverse_bind): (&Index<_>, [f32; 16])| {
         let world = hierarchy.world_from_node.get(joint.value()).ok_or_else(|| {
             document.invalid(&place, format!("there is no nodes[{}]", joint.value()))
         })?;
-        let inverse_bind = DMat4::from_cols_array(&inverse_bind.map(f64::from));
-        let matrix = *world * DAffine3::from_mat4(inverse_bind);
-        match matrix.is_finite() {
-            true => Ok(matrix),
-            false => Err(document.invalid(&place, "its inverse bind matrices are not finite")),
-        }
+        let place = format!("{place}.inverseBindMatrices");
+        Ok(*world * hierarchy::affine(document, inverse_bind, &place, notices)?)
     };
     json.joints.iter().zip(inverse_binds).map(joint).collect()
 }
@@ -44,27 +42,19 @@ pub(super) fn joint_matrices(
 pub(super) fn pose(
     document: &Document,
     mesh: &mut Mesh,
-    binding: &Binding,
+    influences: &[Influences],
     joints: &[DAffine3],
     place: &str,
     notices: &mut Notices,
 ) -> Result<DAffine3, SceneError> {
-    let n = mesh.positions.len();
-    if binding.joints.len() != n || binding.weights.len() != n {
-        return Err(document.invalid(place, "must have one set of joints and weights per position"));
-    }
     let origin = joints.first().map_or(DVec3::ZERO, |j| j.translation);
     let mut unbound = 0;
-    for (i, (indices, weights)) in binding.joints.iter().zip(&binding.weights).enumerate() {
+    for i in 0..mesh.positions.len() {
         let mut blend = DAffine3::from_mat3_translation(DMat3::ZERO, DVec3::ZERO);
         let mut sum = 0.0;
-        for (&index, &weight) in indices.iter().zip(weights) {
-            if weight == 0.0 {
-                continue;
-            }
+        for (index, weight) in influences.iter().flat_map(|set| set.of_vertex(i)) {
             let joint = joints.get(index as usize).ok_or_else(|| {
-                let problem =
-                    format!("vertex {i} uses joint {index}, the skin has {}", joints.len());
+                let problem = format!("a vertex uses joint {index}, the skin has {}", joints.len());
                 document.invalid(place, problem)
             })?;
             let weight = f64::from(weight);
@@ -73,7 +63,7 @@ pub(super) fn pose(
             sum += weight;
         }
         if !sum.is_finite() {
-            return Err(document.invalid(place, format!("weights of vertex {i} are not finite")));
+            return Err(document.invalid(place, "the weights of a vertex are not finite"));
         }
         if sum.abs() < 1e-6 {
             unbound += 1;
@@ -83,7 +73,7 @@ pub(super) fn pose(
         let position = blend.transform_point3(mesh.positions[i].as_dvec3()) / sum;
         mesh.positions[i] = (position - origin).as_vec3();
         if !mesh.positions[i].is_finite() {
-            return Err(document.invalid(place, format!("the pose moves vertex {i} out of range")));
+            return Err(document.invalid(place, "the pose moves a vertex out of range"));
         }
         // Normals transform by the cofactor matrix. Where the pose flattens the surface, the old
         // normal is kept, because no direction is better than another.

@@ -13,7 +13,7 @@ pub(super) fn decode_data(data: &str) -> Result<Vec<u8>, String> {
         .map_err(|e| format!("its data: URI is broken: {e}"))
 }
 
-/// The path that a relative, percent-encoded URI refers to, if it lies below `folder`.
+/// The path that a relative, percent-encoded URI refers to, if it is a regular file below `folder`.
 pub(super) fn file_below(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     let refuse =
         |why: &str| Err(format!("uri {uri:?} {why}; only files below the scene's folder are read"));
@@ -36,6 +36,10 @@ pub(super) fn file_below(folder: &Path, uri: &str) -> Result<PathBuf, String> {
     let file = real(&folder.join(relative))?;
     if !file.starts_with(real(folder)?) {
         return refuse("leads out of the folder by a link");
+    }
+    // Pipes and devices have no end, or make whoever opens them wait.
+    if !file.is_file() {
+        return refuse("is not a regular file");
     }
     Ok(file)
 }
@@ -78,6 +82,7 @@ mod tests {
             "missing.bin",
             "%FF",
             "a%00b",
+            "a%20b",
             absolute.to_str().unwrap(),
         ] {
             assert!(file_below(&folder, bad).is_err(), "{bad}");

@@ -50,7 +50,7 @@ pub(crate) fn sheet(corner: Vec3, u: Vec3, v: Vec3) -> Mesh {
         normals: vec![u.cross(v).normalize(); 4],
         uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: 0,
+        ..Mesh::default()
     }
 }
 
