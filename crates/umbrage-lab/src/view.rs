@@ -1,11 +1,19 @@
 //! Views: the options that a user may give, and the view that follows from them.
 
+use crate::defaults::Defaults;
 use crate::error::{Error, Field};
 use crate::scene::find;
 use crate::values;
 use glam::DVec3;
 use umbrage::{Aabb, Camera, LookAt};
 use umbrage_scene::{Scene, SceneCamera};
+
+/// Largest ratio of far to near distance that is chosen. Depths beyond it have hardly any digits
+/// left near the viewer.
+const MAX_DEPTH_RATIO: f64 = 1e6;
+/// The near distance that is chosen, as a share of the least depth of any surface, so that rounding
+/// cuts nothing away.
+const BEFORE_THE_NEAREST: f64 = 0.99;
 
 /// Default values of a view, for what neither the user nor the scene gives.
 const DEFAULT_VIEW: LookAt = LookAt {
@@ -35,7 +43,7 @@ pub struct ViewOptions {
     pub far: Option<f64>,
     /// Width and height of the picture, pixels; 1 to 16384 each, at most 2²⁶ pixels in all.
     pub size: [u32; 2],
-    /// Name of a camera of the scene.
+    /// A camera of the scene, by a word that [chooses](umbrage_scene::Choices) it.
     pub camera: Option<String>,
 }
 
@@ -93,12 +101,15 @@ impl ViewOptions {
 /// A view, and the camera of the scene that it comes from, if any.
 #[derive(Clone, Debug)]
 pub struct ChosenView {
-    /// Name of the scene's camera, if the view is that of a camera and was not changed.
+    /// The word that chooses the scene's camera, if the view is that of a camera and was not
+    /// changed.
     pub name: Option<String>,
     /// The view's eye, target, field of view, depth range and picture size.
     pub look_at: LookAt,
     /// The same view in the form that the planner takes.
     pub camera: Camera,
+    /// What the user should know of the view: what its near plane cuts away.
+    pub notices: Vec<String>,
 }
 
 impl ChosenView {
@@ -118,17 +129,19 @@ impl ChosenView {
 }
 
 /// Returns the view that is asked for. Values that are left out come from the scene's camera. If
-/// both the eye and the target are given, only the depth range comes from the scene.
+/// both the eye and the target are given, only the depth range comes from the scene. A near distance
+/// that neither the user nor the scene's file gives is less than the depth of whatever lies before
+/// the eye.
 ///
 /// # Errors
-/// An error if the scene has no camera of that name, or if the view is not one that a camera can
-/// have.
-pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<ChosenView, Error> {
+/// An error if the scene has no such camera, or if the view is not one that a camera can have.
+pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<ChosenView, Error> {
+    let scene = defaults.scene();
     let own = match (scene, options.eye, options.target) {
         (None, ..) | (_, Some(_), Some(_)) => None,
-        (Some(scene), ..) => Some(scene_camera(options, scene)?),
+        (Some(scene), ..) => Some(own_camera(options, scene, defaults)?),
     };
-    let base = own.as_ref().map_or(DEFAULT_VIEW, |c| c.look_at(options.size));
+    let base = own.as_ref().map_or(DEFAULT_VIEW, |own| own.camera.look_at(options.size));
     let mut look_at = LookAt {
         eye: options.eye.unwrap_or(base.eye),
         target: options.target.unwrap_or(base.target),
@@ -139,41 +152,73 @@ pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<Chose
         image: options.size,
     };
     let moved = options.eye.is_some() || options.target.is_some();
-    if let Some(scene) = scene
-        && moved
-    {
-        let [near, far] = depth_range(&look_at, scene.bounds());
-        look_at.far = options.far.unwrap_or(far.max(options.near.unwrap_or(0.0) * 2.0));
-        look_at.near = options.near.unwrap_or(near.min(look_at.far / 2.0));
+    let mut notices = Vec::new();
+    if let Some(scene) = scene {
+        if moved || scene.sky.is_some() {
+            let far = end_of(&look_at, scene.bounds());
+            let is_moved_or_beyond = moved || look_at.far > far;
+            if options.far.is_none() && is_moved_or_beyond {
+                look_at.far = far.max(options.near.unwrap_or(0.0) * 2.0);
+            }
+            if options.near.is_none() {
+                // What is nearer is found below; this only has to be a valid view.
+                look_at.near = look_at.near.min(look_at.far / 2.0);
+            }
+        }
+        let nearest = scene.nearest_depth(&Camera::look_at(look_at).map_err(Error::Planning)?);
+        let is_from_file = own.as_ref().is_some_and(|own| own.word.is_some()) && !moved;
+        let least = look_at.far / MAX_DEPTH_RATIO;
+        let before_all = |nearest: f64| (nearest * BEFORE_THE_NEAREST).max(least);
+        if options.near.is_none() && !is_from_file {
+            let near = nearest.map_or(look_at.far / 1000.0, before_all);
+            // Where the program composed the view, it begins well before the nearest surface.
+            let is_cut = nearest.is_some_and(|nearest| nearest < look_at.near);
+            if moved || is_cut {
+                look_at.near = near.min(look_at.far / 2.0);
+            }
+        }
+        notices.extend(nearest.filter(|&nearest| nearest < look_at.near).map(|nearest| {
+            format!(
+                "the near plane, {:.3e} metres away, cuts surfaces away that begin at {nearest:.3e}",
+                look_at.near
+            )
+        }));
     }
     let camera = Camera::look_at(look_at).map_err(Error::Planning)?;
     let numbers = [options.near, options.far, options.fov_deg];
     let changed = numbers.iter().any(Option::is_some) || options.up.is_some();
-    let name = own.map(|c| c.name).filter(|name| {
-        !moved && !changed && scene.is_some_and(|s| s.cameras.iter().any(|c| c.name == *name))
-    });
-    Ok(ChosenView { name, look_at, camera })
+    let name = own.and_then(|own| own.word).filter(|_| !moved && !changed);
+    Ok(ChosenView { name, look_at, camera, notices })
 }
 
-fn scene_camera(options: &ViewOptions, scene: &Scene) -> Result<SceneCamera, Error> {
-    let Some(name) = &options.camera else { return Ok(scene.default_view()) };
-    let index = find(Field::Camera, name, scene.cameras.iter().map(|c| c.name.as_str()))?;
-    Ok(scene.cameras[index].clone())
+/// A camera of the scene or, without a word, the view that was composed for it.
+struct OwnCamera {
+    camera: SceneCamera,
+    word: Option<String>,
 }
 
-/// Returns near and far distances for a view from any position. The far distance is where the scene
-/// ends. The near distance is where it begins, but at least a thousandth of the far distance.
-fn depth_range(look_at: &LookAt, bounds: Aabb) -> [f64; 2] {
+fn own_camera(
+    options: &ViewOptions,
+    scene: &Scene,
+    defaults: &Defaults<'_>,
+) -> Result<OwnCamera, Error> {
+    let choices = scene.camera_choices();
+    let index = match &options.camera {
+        Some(word) => Some(find(Field::Camera, word, &choices)?),
+        None => (!choices.is_empty()).then_some(0),
+    };
+    Ok(match index {
+        Some(index) => OwnCamera {
+            camera: scene.cameras[index].clone(),
+            word: choices.words(index).into_iter().next(),
+        },
+        None => OwnCamera { camera: defaults.view(scene).clone(), word: None },
+    })
+}
+
+/// The far distance for a view from any position: where the scene ends.
+fn end_of(look_at: &LookAt, bounds: Aabb) -> f64 {
     let forward = (look_at.target - look_at.eye).normalize_or(DVec3::NEG_Z);
     let far = bounds.corners().iter().map(|&c| forward.dot(c - look_at.eye)).fold(0.0, f64::max);
-    let far = if far > 0.0 { far * 1.01 } else { 100.0 };
-    let distance = look_at.eye.distance(look_at.eye.clamp(bounds.min, bounds.max));
-    // The scene's nearest point may lie in a corner of the picture, where the depth is less than
-    // the distance.
-    let corner = {
-        let tan_y = (look_at.fov_y_rad / 2.0).tan();
-        let tan_x = tan_y * f64::from(look_at.image[0]) / f64::from(look_at.image[1]);
-        (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt()
-    };
-    [(distance / corner).max(far / 1000.0), far]
+    if far > 0.0 { far * 1.01 } else { 100.0 }
 }

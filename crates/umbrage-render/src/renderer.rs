@@ -221,7 +221,7 @@ impl<'g, 's> Renderer<'g, 's> {
         instances.begin(scene, plan.origin);
         let lists: Vec<DrawList> = prepared
             .stale()
-            .map(|redraw| instances.add(scene, |aabb| redraw.may_cast(aabb)))
+            .map(|redraw| instances.add_casters(scene, |aabb| redraw.may_cast(aabb)))
             .collect();
         let mut drawn: Vec<(usize, Drawn)> = Vec::with_capacity(lists.len());
         if lists.is_empty() {

@@ -3,7 +3,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::Aabb;
-use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture, Wrap};
+use umbrage_scene::{Alpha, Material, Mesh, Role, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
@@ -34,6 +34,7 @@ pub(crate) struct Drawable {
     pub(crate) world_from_mesh: DAffine3,
     /// World space, metres.
     pub(crate) bounds: Aabb,
+    pub(crate) role: Role,
 }
 
 /// The range of a mesh in the buffers.
@@ -123,10 +124,12 @@ impl<'a> SceneBuffers<'a> {
         });
         let meshes: Vec<MeshRange> = meshes.collect();
         let boxes = scene.instance_boxes();
-        let drawable = scene.instances.iter().zip(boxes).map(|(instance, bounds)| Drawable {
+        let drawable = scene.instances.iter().enumerate().zip(boxes);
+        let drawable = drawable.map(|((i, instance), bounds)| Drawable {
             mesh: instance.mesh,
             world_from_mesh: instance.world_from_mesh,
             bounds,
+            role: scene.roles.of(i),
         });
         let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
         instances.sort_by_key(|i| i.mesh);

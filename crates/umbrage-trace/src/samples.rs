@@ -134,10 +134,8 @@ impl<'a> View<'a> {
         let is_towards = surface.geometric_normal.dot(to_eye) > 0.0;
         // Surfaces nearer to the eye than the near distance hide nothing.
         let end = 1.0 - self.camera.near() / depth;
-        let is_seen = is_inside
-            && is_towards
-            && end >= 0.0
-            && !self.tracer.occluded_from(surface, to_eye, end);
+        let is_seen =
+            is_inside && is_towards && end >= 0.0 && !self.tracer.hidden_from(surface, to_eye, end);
         is_seen.then(|| Sample {
             surface: *surface,
             depth,

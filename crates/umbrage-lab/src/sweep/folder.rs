@@ -209,6 +209,7 @@ pub(super) fn check_same(
     present: &SweepSettings,
     wanted: &SweepSettings,
 ) -> Result<(), Error> {
+    let on = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
     let values = |s: &SweepSettings| {
         [
             (Field::Shadows, s.shadows.join(" ")),
@@ -216,7 +217,9 @@ pub(super) fn check_same(
             (Field::Size, format!("{}x{}", s.size[0], s.size[1])),
             (Field::Samples, s.samples.to_string()),
             (Field::Fit, s.fit.clone()),
-            (Field::Opaque, if s.opaque { "on" } else { "off" }.to_owned()),
+            (Field::Opaque, on(s.opaque)),
+            (Field::Without, s.without.join(" ")),
+            (Field::Ground, on(s.ground)),
             (Field::Backend, s.backend.clone()),
         ]
     };

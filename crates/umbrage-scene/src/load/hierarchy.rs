@@ -13,6 +13,8 @@ pub(super) struct Hierarchy {
     pub(super) world_from_node: Vec<DAffine3>,
     /// Indices of the nodes in the shown scene, each once, with parents before their children.
     pub(super) shown: Vec<usize>,
+    /// The parent of each node, indexed by node.
+    pub(super) parent: Vec<Option<usize>>,
 }
 
 impl Hierarchy {
@@ -76,7 +78,7 @@ impl Hierarchy {
                 open[first..].reverse();
             }
         }
-        Ok(Self { world_from_node, shown })
+        Ok(Self { world_from_node, shown, parent })
     }
 }
 

@@ -10,9 +10,13 @@ mod skin;
 mod uri;
 
 use crate::error::SceneError;
+use crate::nodes::SceneNode;
+use crate::sky;
 use crate::types::{Instance, Mesh, Scene};
 use document::{Document, Notices};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
+use gltf::json::extensions::scene::khr_lights_punctual::Type;
+use gltf::json::validation::Checked;
 use gltf::json::{Index, Node};
 use hierarchy::{Hierarchy, LARGEST};
 use material::Materials;
@@ -63,12 +67,16 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
         },
         notices: Notices::default(),
     };
-    for &node in &hierarchy.shown {
-        loader.load_mesh(node)?;
+    let mut place_of = vec![None; document.root.nodes.len()];
+    for (place, &node) in hierarchy.shown.iter().enumerate() {
+        place_of[node] = Some(place);
+        loader.load_node(node, hierarchy.parent[node].and_then(|parent| place_of[parent]))?;
     }
-    let bounds = loader.check_drawn()?;
-    for &node in &hierarchy.shown {
-        loader.load_camera_and_light(node, bounds)?;
+    loader.check_drawn()?;
+    sky::find(&mut loader.scene, has_lamps(&document, &hierarchy));
+    let bounds = loader.scene.bounds();
+    for (place, &node) in hierarchy.shown.iter().enumerate() {
+        loader.load_camera_and_light(place, node, bounds)?;
     }
     Ok(loader.finish())
 }
@@ -95,7 +103,31 @@ struct Loader<'a> {
     notices: Notices,
 }
 
+/// Whether a shown node holds a spot or point light.
+fn has_lamps(document: &Document, hierarchy: &Hierarchy) -> bool {
+    let lights = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+    let is_lamp = |node: usize| {
+        let held = document.root.nodes[node].extensions.as_ref()?.khr_lights_punctual.as_ref()?;
+        let light = lights?.lights.get(held.light.value())?;
+        Some(!matches!(light.type_, Checked::Valid(Type::Directional)))
+    };
+    hierarchy.shown.iter().any(|&node| is_lamp(node) == Some(true))
+}
+
 impl Loader<'_> {
+    /// Loads a node's mesh, and notes the node. `parent` is the place of its parent among the nodes.
+    fn load_node(&mut self, index: usize, parent: Option<usize>) -> Result<(), SceneError> {
+        let begin = self.scene.instances.len();
+        self.load_mesh(index)?;
+        self.scene.nodes.push(SceneNode {
+            name: self.document.root.nodes[index].name.clone().unwrap_or_default(),
+            parent,
+            instances: begin..self.scene.instances.len(),
+            ..SceneNode::default()
+        });
+        Ok(())
+    }
+
     fn load_mesh(&mut self, index: usize) -> Result<(), SceneError> {
         let node = &self.document.root.nodes[index];
         let Some(mesh) = node.mesh else { return Ok(()) };
@@ -251,11 +283,11 @@ impl Loader<'_> {
         (0..n).map(copy).collect()
     }
 
-    /// The box around the scene.
+    /// Checks what is drawn.
     ///
     /// # Errors
     /// The scene draws nothing, or extends beyond [`WORLD_END`].
-    fn check_drawn(&self) -> Result<Aabb, SceneError> {
+    fn check_drawn(&self) -> Result<(), SceneError> {
         let bounds = self.scene.bounds();
         if self.scene.drawn_triangles() == 0 {
             return Err(self.document.invalid("scene", "there are no triangles to draw"));
@@ -265,10 +297,17 @@ impl Loader<'_> {
             let problem = format!("reaches {reach:e} m from the origin, the world ends at 1e12 m");
             return Err(self.document.invalid("scene", problem));
         }
-        Ok(bounds)
+        Ok(())
     }
 
-    fn load_camera_and_light(&mut self, index: usize, bounds: Aabb) -> Result<(), SceneError> {
+    /// Loads the camera and the light of the node with this index, whose place among the scene's
+    /// nodes is `place`.
+    fn load_camera_and_light(
+        &mut self,
+        place: usize,
+        index: usize,
+        bounds: Aabb,
+    ) -> Result<(), SceneError> {
         let node = &self.document.root.nodes[index];
         let world = &self.hierarchy.world_from_node[index];
         let name = node.name.as_deref();
@@ -282,6 +321,7 @@ impl Loader<'_> {
                 bounds,
                 notices,
             )?;
+            self.scene.nodes[place].camera = camera.is_some().then_some(self.scene.cameras.len());
             self.scene.cameras.extend(camera);
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
@@ -289,6 +329,7 @@ impl Loader<'_> {
             let (index, notices) = (light.light.value(), &mut self.notices);
             let light =
                 cameras_and_lights::load_light(self.document, index, name, world, bounds, notices)?;
+            self.scene.nodes[place].light = light.is_some().then_some(self.scene.lights.len());
             self.scene.lights.extend(light);
         }
         Ok(())

@@ -1,3 +1,4 @@
+use crate::nodes::Role;
 use crate::types::{Mesh, Scene};
 use glam::{DVec3, IVec3, USizeVec3, Vec3};
 use umbrage::Aabb;
@@ -6,8 +7,11 @@ use umbrage::Aabb;
 const CELLS: f64 = 160.0;
 /// Least number of cells along the other edges, so that flat scenes keep their relief.
 const MIN_CELLS: f64 = 24.0;
-/// Largest number of triangles that are entered. Of larger scenes, only every n-th triangle is.
+/// Number of triangles to enter. Of larger scenes, only every n-th triangle of fine meshes and of
+/// small instances is.
 const MAX_TRIANGLES: u64 = 4_000_000;
+/// Number of triangles from which a mesh counts as fine.
+const FINE: usize = 1000;
 
 /// Directions that the surfaces in a cell face, one bit each: −x, −y, −z, +x, +y, +z.
 pub(super) type Facing = u8;
@@ -51,12 +55,28 @@ impl Occupancy {
             cells: vec![0; size.x * size.y * size.z],
             floor: vec![None; size.x * size.z],
         };
-        let drawn = scene.drawn_triangles();
-        for instance in &scene.instances {
+        let step = scene.drawn_triangles().div_ceil(MAX_TRIANGLES).max(1) as usize;
+        let sizes: Vec<DVec3> = scene.meshes.iter().map(|m| m.bounds().size()).collect();
+        // The first triangle that is entered of the next instance that is thinned out.
+        let mut first = 0;
+        for instance in scene.instances_that(Role::is_receiver) {
             let mesh = &scene.meshes[instance.mesh];
+            let world_from_mesh = instance.world_from_mesh;
             let double_sided = scene.materials.get(mesh.material).is_some_and(|m| m.double_sided);
-            let step = if mesh.triangles.len() < 1000 { 1 } else { drawn.div_ceil(MAX_TRIANGLES) };
-            grid.add(mesh, instance.world_from_mesh, double_sided, step as usize);
+            // Every triangle of a coarse mesh is seen. Where there are a million of them, each is
+            // smaller than a cell, and some of its triangles stand for all.
+            let m = world_from_mesh.matrix3;
+            let reach = m.x_axis.abs() * sizes[instance.mesh].x
+                + m.y_axis.abs() * sizes[instance.mesh].y
+                + m.z_axis.abs() * sizes[instance.mesh].z;
+            if mesh.triangles.len() >= FINE || reach.cmple(cell).all() {
+                grid.add(mesh, world_from_mesh, double_sided, first, step);
+                let ahead =
+                    first + step * mesh.triangles.len().saturating_sub(first).div_ceil(step);
+                first = ahead - mesh.triangles.len();
+            } else {
+                grid.add(mesh, world_from_mesh, double_sided, 0, 1);
+            }
         }
         for z in 0..size.z {
             for x in 0..size.x {
@@ -67,15 +87,17 @@ impl Occupancy {
         grid
     }
 
+    /// Enters every `step`-th triangle of a mesh from the `first` on.
     fn add(
         &mut self,
         mesh: &Mesh,
         world_from_mesh: glam::DAffine3,
         double_sided: bool,
+        first: usize,
         step: usize,
     ) {
         let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
-        for t in mesh.triangles.iter().step_by(step) {
+        for t in mesh.triangles.iter().skip(first).step_by(step) {
             let [a, b, c] = t.map(|i| {
                 let p = world_from_mesh.transform_point3(mesh.positions[i as usize].as_dvec3());
                 (p, ((p - self.bounds.min) / self.cell).as_vec3())
