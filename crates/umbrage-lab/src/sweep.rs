@@ -225,9 +225,7 @@ fn compare_missing(
         progress.note(&format!("{done} of {} views are done already", views.len()));
     }
     folder.remove_tables()?;
-    if let Some(choice) = executors.choice() {
-        progress.backend(choice);
-    }
+    progress.backend(executors.choice());
     progress.parts(pending.len() as u64);
     let told = |error: Error| in_words_of_the_file(&error, options.words);
     let mut number = done;
@@ -289,9 +287,7 @@ fn compare(
         Comparison::new(prepared, &view, &light, &options.comparison).map_err(told)
     });
     let compared = comparison.as_ref().map_err(Clone::clone).and_then(|comparison| {
-        for notice in &comparison.chosen_view().notices {
-            progress.warn(&format!("{}: {notice}", inputs.view.name));
-        }
+        progress.chosen(comparison.chosen_view(), comparison.chosen_light());
         progress.rows(comparison.rows());
         comparison.trace(progress).map_err(told)
     });

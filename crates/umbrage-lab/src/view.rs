@@ -115,9 +115,13 @@ pub struct ChosenView {
 impl ChosenView {
     /// Returns the view in the form that reports show.
     pub fn info(&self) -> umbrage_measure::View {
-        let look_at = &self.look_at;
+        Self::info_of(self.name.clone(), &self.look_at)
+    }
+
+    /// Returns any view in the form that reports show.
+    pub fn info_of(name: Option<String>, look_at: &LookAt) -> umbrage_measure::View {
         umbrage_measure::View {
-            name: self.name.clone(),
+            name,
             eye: look_at.eye.to_array(),
             target: look_at.target.to_array(),
             up: look_at.up.to_array(),

@@ -138,3 +138,170 @@ fn nearest_hit(
     }
     nearest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nodes::SceneNode;
+    use crate::types::{Instance, Mesh};
+    use glam::Vec3;
+
+    /// A scene with a node for each of these meshes. Their parents come first.
+    fn scene_of(parts: Vec<(&str, Option<usize>, Mesh)>) -> Scene {
+        let mut scene = Scene::default();
+        for (name, parent, mesh) in parts {
+            let begin = scene.instances.len();
+            if !mesh.triangles.is_empty() {
+                let world_from_mesh = DAffine3::IDENTITY;
+                scene.instances.push(Instance { mesh: scene.meshes.len(), world_from_mesh });
+            }
+            scene.meshes.push(mesh);
+            let instances = begin..scene.instances.len();
+            scene.nodes.push(SceneNode {
+                name: name.into(),
+                parent,
+                instances,
+                ..SceneNode::default()
+            });
+        }
+        scene
+    }
+
+    /// Some sides of a box: 0 and 1 are those at −x and +x, 2 and 3 bottom and top, then −z and +z.
+    fn sides(min: Vec3, max: Vec3, which: &[usize]) -> Mesh {
+        let mut mesh = Mesh::default();
+        for &side in which {
+            let (axis, is_high) = (side / 2, side % 2 == 1);
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let first = mesh.positions.len() as u32;
+            for (i, j) in [(false, false), (true, false), (true, true), (false, true)] {
+                let mut corner = min;
+                for (axis, is_high) in [(axis, is_high), (u, i), (v, j)] {
+                    corner[axis] = if is_high { max[axis] } else { min[axis] };
+                }
+                mesh.positions.push(corner);
+            }
+            mesh.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i| first + i)));
+        }
+        mesh
+    }
+
+    const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
+
+    fn block(center: Vec3, half: Vec3) -> Mesh {
+        sides(center - half, center + half, &ALL)
+    }
+
+    fn ground(half: f32) -> Mesh {
+        sides(Vec3::new(-half, 0.0, -half), Vec3::new(half, 0.0, half), &[2])
+    }
+
+    /// A sphere's part above a height, in units of its radius.
+    fn dome(radius: f32, lowest: f32) -> Mesh {
+        const AROUND: u32 = 24;
+        const UP: u32 = 12;
+        let mut mesh = Mesh::default();
+        for i in 0..=UP {
+            let low = lowest.asin();
+            let up = low + (std::f32::consts::FRAC_PI_2 - low) * i as f32 / UP as f32;
+            for k in 0..AROUND {
+                let (sin, cos) = (k as f32 / AROUND as f32 * std::f32::consts::TAU).sin_cos();
+                mesh.positions.push(Vec3::new(cos * up.cos(), up.sin(), sin * up.cos()) * radius);
+                if i < UP {
+                    let [a, b] = [k, (k + 1) % AROUND].map(|k| i * AROUND + k);
+                    mesh.triangles.extend([[a, b, b + AROUND], [a, b + AROUND, a + AROUND]]);
+                }
+            }
+        }
+        mesh
+    }
+
+    fn statues() -> Mesh {
+        block(Vec3::new(3.0, 1.0, -2.0), Vec3::new(0.5, 1.0, 0.5))
+    }
+
+    /// The name of the node that is taken for the sky.
+    fn sky_of(mut scene: Scene, has_lamps: bool, scale: f64) -> Option<String> {
+        for instance in &mut scene.instances {
+            instance.world_from_mesh = DAffine3::from_scale(DVec3::splat(scale));
+        }
+        let all = scene.bounds();
+        find(&mut scene, has_lamps);
+        let sky = scene.sky?;
+        // What is taken for sky no longer decides the size, and nothing else is.
+        let rest = scene.bounds();
+        assert!(rest.size().y < 0.5 * all.size().y, "{rest:?} {all:?}");
+        Some(scene.nodes[sky].name.clone())
+    }
+
+    #[test]
+    fn domes_and_boxes_around_all_else_are_skies() {
+        for scale in [1e-6, 1.0, 1e5] {
+            for sky in [
+                vec![("sky", None, dome(300.0, -1.0))],
+                vec![("sky", None, dome(300.0, 0.0))],
+                vec![("sky", None, block(Vec3::ZERO, Vec3::splat(300.0)))],
+                std::iter::once(("sky", None, Mesh::default()))
+                    .chain(ALL.map(|side| {
+                        let half = Vec3::splat(300.0);
+                        ("side", Some(2), sides(-half, half, &[side]))
+                    }))
+                    .collect(),
+            ] {
+                let content = vec![("ground", None, ground(20.0)), ("statues", None, statues())];
+                let scene = scene_of([content, sky].concat());
+                assert_eq!(sky_of(scene, false, scale).as_deref(), Some("sky"), "{scale}");
+            }
+        }
+    }
+
+    #[test]
+    fn ground_may_reach_to_the_foot_of_the_sky() {
+        for half in [50.0, 290.0, 1000.0] {
+            let parts = vec![
+                ("sky", None, dome(300.0, -0.1)),
+                ("ground", None, ground(half)),
+                ("statues", None, statues()),
+            ];
+            assert_eq!(sky_of(scene_of(parts), false, 1.0).as_deref(), Some("sky"), "{half}");
+        }
+    }
+
+    #[test]
+    fn rooms_valleys_and_covers_are_no_skies() {
+        let table = || block(Vec3::new(0.5, 0.4, 0.0), Vec3::new(0.6, 0.4, 0.4));
+        let (low, high) = (Vec3::new(-4.0, 0.0, -4.0), Vec3::new(4.0, 3.0, 4.0));
+        let hanging = || block(Vec3::new(0.0, 1.5, 0.0), Vec3::splat(0.2));
+        let floor = || sides(low, high, &[2]);
+        for (what, parts) in [
+            ("a room", vec![("room", None, sides(low, high, &ALL)), ("table", None, table())]),
+            (
+                "a lamp in it",
+                vec![("room", None, sides(low, high, &ALL)), ("lamp", None, hanging())],
+            ),
+            (
+                "walls and ceiling",
+                vec![("walls", None, sides(low, high, &[0, 1, 3, 4, 5])), ("floor", None, floor())],
+            ),
+            (
+                "a court",
+                vec![
+                    ("walls", None, sides(low * 30.0, high * 30.0, &[0, 1, 4, 5])),
+                    ("t", None, table()),
+                ],
+            ),
+            ("a bell jar", vec![("jar", None, dome(1.6, 0.0)), ("table", None, table())]),
+            (
+                "a ceiling",
+                vec![("ceiling", None, sides(low * 9.0, high * 9.0, &[3])), ("t", None, table())],
+            ),
+            ("one thing", vec![("table", None, table())]),
+            ("ground", vec![("ground", None, ground(5000.0)), ("table", None, table())]),
+        ] {
+            assert_eq!(sky_of(scene_of(parts), true, 1.0), None, "{what}");
+        }
+        // Without lamps a room carries what stands in it all the same.
+        let room = vec![("room", None, sides(low, high, &ALL)), ("table", None, table())];
+        assert_eq!(sky_of(scene_of(room), false, 1.0), None);
+    }
+}
