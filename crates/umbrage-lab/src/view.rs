@@ -157,20 +157,23 @@ pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<Cho
     };
     let moved = options.eye.is_some() || options.target.is_some();
     let mut notices = Vec::new();
+    let is_from_file = own.as_ref().is_some_and(|own| own.word.is_some()) && !moved;
     if let Some(scene) = scene {
-        if moved || scene.sky.is_some() {
-            let far = end_of(&look_at, scene.bounds());
-            let is_moved_or_beyond = moved || look_at.far > far;
-            if options.far.is_none() && is_moved_or_beyond {
-                look_at.far = far.max(options.near.unwrap_or(0.0) * 2.0);
-            }
-            if options.near.is_none() {
-                // What is nearer is found below; this only has to be a valid view.
-                look_at.near = look_at.near.min(look_at.far / 2.0);
-            }
+        let end = || end_of(&look_at, scene.bounds());
+        let far = match options.far {
+            None if moved => Some(end()),
+            // A camera of the file may reach as far as the sky, on which no map is spent.
+            None if scene.sky.is_some() && is_from_file => Some(end().min(look_at.far)),
+            _ => None,
+        };
+        if let Some(far) = far {
+            look_at.far = far.max(options.near.unwrap_or(0.0) * 2.0);
+        }
+        if options.near.is_none() {
+            // What is nearer is found below; this only has to be a valid view.
+            look_at.near = look_at.near.min(look_at.far / 2.0);
         }
         let nearest = scene.nearest_depth(&Camera::look_at(look_at).map_err(Error::Planning)?);
-        let is_from_file = own.as_ref().is_some_and(|own| own.word.is_some()) && !moved;
         let least = look_at.far / MAX_DEPTH_RATIO;
         let before_all = |nearest: f64| (nearest * BEFORE_THE_NEAREST).max(least);
         if options.near.is_none() && !is_from_file {

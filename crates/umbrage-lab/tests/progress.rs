@@ -95,7 +95,7 @@ fn a_sweep_names_its_parts_and_what_failed() {
             "2/4 b",
             "b: far: must exceed near (5), is 4",
             "3/4 c",
-            "c: light: the scene has no light `moon`; there are sun",
+            "c: light: the scene has no light `moon`; there are sun or #1",
             "4/4 d",
         ]
     );
