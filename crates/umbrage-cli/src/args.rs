@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 mod compare;
+mod info;
 mod picture;
 mod plan;
 mod technique;
@@ -9,13 +10,14 @@ pub(crate) mod theory;
 mod view;
 
 pub(crate) use compare::{Compare, Sweep};
-pub(crate) use picture::{Aov, PictureKind, Render};
+pub(crate) use info::Info;
+pub(crate) use picture::{Aov, PictureArgs, PictureKind, Render};
 pub(crate) use plan::Plan;
-pub(crate) use technique::Fit;
+pub(crate) use view::{SceneArgs, SceneChangeArgs, ViewArgs};
 
 use crate::output;
 use clap::builder::PossibleValuesParser;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -55,6 +57,8 @@ pub(crate) enum Command {
     Sweep(Sweep),
     /// Print the matrices, resolutions and errors that an engine needs.
     Plan(Plan),
+    /// Tell what is in a scene: cameras, lights, sizes, and the view and light that would be taken.
+    Info(Info),
     /// List the built-in scenes.
     Scenes(Scenes),
     /// Compute the papers' figures again, from closed forms, planned maps and renders.
@@ -65,6 +69,8 @@ pub(crate) enum Command {
     Bench(bench::Bench),
     /// List the GPUs there are, and what they can do.
     Devices(bench::Devices),
+    /// Print a script by which a shell completes this program's command lines.
+    Completions(Completions),
     /// Explain a command, or how techniques are written: `umbrage help shadows`.
     Help(Help),
 }
@@ -96,6 +102,18 @@ pub(crate) struct Scenes {
     pub(crate) json: bool,
 }
 
+/// `umbrage completions`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  umbrage completions bash > ~/.local/share/bash-completion/completions/umbrage
+  umbrage completions fish > ~/.config/fish/completions/umbrage.fish")]
+pub(crate) struct Completions {
+    /// The shell.
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
 /// `umbrage figures`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -104,7 +122,7 @@ Examples:
   umbrage figures -o figures --only lispsm-fig6")]
 pub(crate) struct Figures {
     /// Folder for pictures, tables and their page; former figures there are replaced.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", default_value = "figures")]
     pub(crate) output: PathBuf,
     /// Make this figure alone; once for each.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(umbrage_figures::names()))]
@@ -112,7 +130,7 @@ pub(crate) struct Figures {
 }
 
 /// What is done if no command is given.
-const MAIN_JOB: [&str; 5] = ["umbrage", "compare", "town", "--output", "report"];
+const MAIN_JOB: [&str; 3] = ["umbrage", "compare", "town"];
 
 /// Parses and checks a command line; its first word is the program's name. Gives the command and
 /// how verbose to be.
@@ -139,7 +157,12 @@ pub(crate) fn parse(
         Command::Compare(compare) => compare.check(),
         Command::Sweep(sweep) => sweep.comparison.techniques.check(),
         Command::Plan(plan) => plan.check(),
-        Command::Scenes(_) | Command::Figures(_) | Command::Devices(_) | Command::Help(_) => Ok(()),
+        Command::Info(info) => info.check(),
+        Command::Scenes(_)
+        | Command::Figures(_)
+        | Command::Devices(_)
+        | Command::Completions(_)
+        | Command::Help(_) => Ok(()),
         Command::Bench(bench) => bench.check(),
         Command::Theory(theory) => theory.check(),
     };
@@ -153,6 +176,13 @@ impl Help {
     fn is_language(&self) -> bool {
         self.topic == [LANGUAGE]
     }
+}
+
+/// The script that completes command lines in a shell.
+pub(crate) fn completions(shell: clap_complete::Shell) -> Vec<u8> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "umbrage", &mut script);
+    script
 }
 
 /// Clap's message on one line, without usage and pointers to `--help`.

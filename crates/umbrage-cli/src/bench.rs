@@ -3,14 +3,14 @@
 use crate::args::bench;
 use crate::output::{aligned, print};
 use crate::progress::Bar;
-use crate::setup::{announce, open_scene, tell_notices};
+use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_notices};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
 use umbrage::{Bounds, Plan, Planner};
 use umbrage_lab::{
     Bencher, Costs, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
-    choose_light, choose_view, milliseconds, plan, plan_with, planner,
+    milliseconds, plan, plan_with, planner,
 };
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
@@ -124,20 +124,26 @@ struct Frame {
 
 /// Measures the techniques, and prints a table or JSON.
 pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
-    let scene = open_scene(&args.scene.name)?;
-    let chosen_view = choose_view(&args.view.options(), Some(&scene))?;
+    let bar = Bar::of_parts(quiet);
+    let scene = open_scene(&args.scene, &bar)?;
+    let Chosen { view: chosen_view, lights } =
+        choose(&args.view, &[args.light.options()], Some(&scene), &bar)?;
     let camera = chosen_view.camera;
-    let chosen_light = choose_light(&args.light.options(), Some(&scene))?;
+    let chosen_light = &lights[0];
+    bar.stage("preparing the scene");
     let techniques = &args.techniques.shadows;
     let executors = Executors::open(args.techniques.execution.backend.into(), techniques)?;
-    let render_scene = RenderScene::new(&scene, &executors, args.scene.opaque)?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque)?;
     let tracer = render_scene.tracer();
     let view = umbrage_trace::View::new(tracer, camera, chosen_light.light, 1)?;
     let receivers = Receivers::new(&scene, tracer, args.techniques.fit.into());
     let seen = render_scene.seen(&receivers, &camera)?;
     let bounds = receivers.bounds(seen.as_ref());
-    tell_notices(&scene);
-    announce(&executors);
+    bar.aside(|| {
+        tell_notices(&scene);
+        tell_chosen(&chosen_view, &lights);
+        announce(&executors);
+    });
     let contender =
         |technique| Contender::new(&render_scene, technique, &receivers, camera.image());
     let mut contenders = techniques.iter().map(contender).collect::<Result<Vec<_>>>()?;
@@ -149,7 +155,8 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             contenders.push(none);
         }
     }
-    take_turns(&mut contenders, args, &view, &bounds, quiet)?;
+    take_turns(&mut contenders, args, &view, &bounds, &bar)?;
+    drop(bar);
     let results = contenders.iter().map(|contender| {
         let none = none_for(&contenders, contender.is_gpu()).context("frames without shadows")?;
         let device = executors.device().filter(|_| contender.is_gpu());
@@ -181,10 +188,10 @@ fn take_turns(
     args: &bench::Bench,
     view: &umbrage_trace::View<'_>,
     bounds: &Bounds<'_>,
-    quiet: bool,
+    bar: &Bar,
 ) -> Result<()> {
     let frames = WARM_UP + args.frames;
-    let bar = Bar::new(u64::from(frames) * contenders.len() as u64, quiet);
+    bar.one_part(u64::from(frames) * contenders.len() as u64);
     for index in 0..frames {
         // The technique that comes first changes from frame to frame.
         let first = index as usize % contenders.len();

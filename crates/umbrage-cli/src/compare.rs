@@ -6,29 +6,36 @@ use crate::progress::Bar;
 use crate::setup::{announce, open_scene, tell_notices};
 use anyhow::Result;
 use umbrage_lab::{
-    Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, ReportFolder,
+    Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, Progress,
+    ReportFolder,
 };
 use umbrage_measure::{Measured, Report, TruthKind};
 
 /// Compares the techniques, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output, Contents::COMPARISON)?;
-    let scene = open_scene(&args.scene.name)?;
+    let bar = Bar::of_parts(quiet);
+    let scene = open_scene(&args.scene, &bar)?;
+    bar.stage("preparing the scene");
     let techniques = &args.comparison.techniques;
     let executors = Executors::open(techniques.execution.backend.into(), &techniques.shadows)?;
     let prepared =
-        PreparedScene::new(&scene, &executors, args.scene.opaque, techniques.fit.into())?;
+        PreparedScene::new(&scene, &executors, args.scene.changes.opaque, techniques.fit.into())?;
     let options = args.comparison.options();
     let (view, light) = (args.view.options(), args.light.options());
+    bar.stage("planning");
     let comparison = Comparison::new(&prepared, &view, &light, &options)?;
     let motion = args.motion.map(Motion::from);
     if let Some(motion) = motion {
         comparison.check_motion(motion, args.frames)?;
     }
-    tell_notices(&scene);
-    announce(&executors);
+    bar.aside(|| {
+        tell_notices(&scene);
+        announce(&executors);
+    });
+    bar.chosen(comparison.chosen_view(), comparison.chosen_light());
     let moving = motion.map_or(0, |motion| comparison.rows_of_motion(motion, args.frames));
-    let bar = Bar::new(comparison.rows() + moving, quiet);
+    bar.one_part(comparison.rows() + moving);
     let mut compared = comparison.trace(&bar)?;
     if let Some(motion) = motion {
         compared.move_on(motion, args.frames, &bar)?;

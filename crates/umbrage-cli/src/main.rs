@@ -7,6 +7,7 @@ mod bench;
 mod compare;
 mod devices;
 mod figures;
+mod info;
 mod output;
 mod plan;
 mod progress;
@@ -43,12 +44,16 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args, quiet),
         Command::Compare(args) => compare::run(args, quiet),
         Command::Sweep(args) => sweep::run(args, quiet),
-        Command::Plan(args) => plan::run(args),
+        Command::Plan(args) => plan::run(args, quiet),
+        Command::Info(args) => info::run(args, quiet),
         Command::Scenes(args) => scenes::run(args),
         Command::Figures(args) => figures::run(args, quiet),
         Command::Theory(args) => theory::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Devices(args) => devices::run(args),
+        Command::Completions(args) => {
+            output::print(&String::from_utf8_lossy(&args::completions(args.shell)))
+        }
         Command::Help(_) => output::print(&umbrage::language::help()),
     })
 }

@@ -1,8 +1,9 @@
 //! `umbrage plan` prints the matrices, resolutions and errors that an engine needs.
 
-use crate::args::{self, Fit};
+use crate::args;
 use crate::output::{print, six_digits};
-use crate::setup::{open_scene, tell_notices};
+use crate::progress::Bar;
+use crate::setup::{Chosen, choose, open_changed, tell_chosen, tell_notices};
 use anyhow::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write;
@@ -10,9 +11,10 @@ use umbrage::{
     Atlas, Bounds, CubeSide, Face, Light, MapError, Part, Plan, ShadowMap, Size, Slab, Warp,
 };
 use umbrage_lab::{
-    ChosenLight, ChosenView, MapCasters, NamedTechnique, Receivers, casters, casters_culled,
-    choose_light, choose_view, planner,
+    ChosenLight, ChosenView, Fit, MapCasters, NamedTechnique, Progress, Receivers, casters,
+    casters_culled, planner,
 };
+use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
 use umbrage_trace::Tracer;
 
@@ -30,12 +32,16 @@ struct PlanJson {
     layers: Option<LayersJson>,
     /// Mean over maps of the share of casters that are culled; `null` without a scene.
     casters_culled: Option<f64>,
+    /// What the maps are fitted to; `null` without a scene.
+    fit: Option<&'static str>,
+    view: View,
 }
 
 #[derive(Serialize)]
 struct LightJson {
     /// `null` if the light has no name.
     name: Option<String>,
+    light: LightInfo,
     theta_deg: f64,
     /// Indices of the light's first map and of the map after its last.
     maps: [usize; 2],
@@ -124,23 +130,25 @@ struct Planned<'a> {
     casters: Option<Vec<MapCasters>>,
     /// Mean over maps of the share of casters that are culled.
     culled: Option<f64>,
+    /// What the maps are fitted to; `None` without a scene.
+    fit: Option<Fit>,
 }
 
 /// Computes the plan, and prints it.
-pub(crate) fn run(args: &args::Plan) -> Result<()> {
-    let scene = args.scene.as_deref().map(open_scene).transpose()?;
-    let view = choose_view(&args.view.options(), scene.as_ref())?;
-    let lights = args.lights.each().into_iter().map(|l| choose_light(&l, scene.as_ref()));
-    let chosen: Vec<ChosenLight> = lights.collect::<Result<_, _>>()?;
-    if let Some(scene) = &scene {
-        tell_notices(scene);
-    }
-    let receivers = scene.as_ref().map(|scene| match args.fit {
+pub(crate) fn run(args: &args::Plan, quiet: bool) -> Result<()> {
+    let bar = Bar::of_parts(quiet);
+    let scene = args.scene.as_deref().map(|name| open_changed(name, &args.changes, &bar));
+    let scene = scene.transpose()?;
+    let Chosen { view, lights: chosen } =
+        choose(&args.view, &args.lights.each(), scene.as_ref(), &bar)?;
+    bar.stage("planning");
+    let fit = Fit::from(args.fit);
+    let receivers = scene.as_ref().map(|scene| match fit {
         // This is the only command that can work without a ray tracer.
         Fit::Box => Ok((Receivers::in_box(scene), None)),
         fit => {
-            let tracer = Tracer::new(scene)?;
-            let receivers = Receivers::new(scene, &tracer, fit.into());
+            let tracer = Tracer::new(scene)?.opaque(args.changes.opaque);
+            let receivers = Receivers::new(scene, &tracer, fit);
             let seen = receivers.seen(&tracer, &view.camera)?;
             Ok::<_, Error>((receivers, seen))
         }
@@ -156,7 +164,13 @@ pub(crate) fn run(args: &args::Plan) -> Result<()> {
     let plan = planner
         .plan(&view.camera, &lights, &bounds, technique.technique())
         .map_err(|e| technique.blame(e))?;
-    let planned = Planned::new(plan, max_side, technique, &view, &chosen, scene.as_ref());
+    drop(bar);
+    if let Some(scene) = &scene {
+        tell_notices(scene);
+    }
+    tell_chosen(&view, &chosen);
+    let fit = scene.is_some().then_some(fit);
+    let planned = Planned::new(plan, max_side, technique, &view, &chosen, scene.as_ref(), fit);
     if args.json {
         if !plan.maps.is_empty() && plan.maps.iter().all(ShadowMap::is_empty) {
             log::warn!("{}", nothing_served(&view));
@@ -175,13 +189,14 @@ impl<'a> Planned<'a> {
         view: &'a ChosenView,
         chosen_lights: &'a [ChosenLight],
         scene: Option<&Scene>,
+        fit: Option<Fit>,
     ) -> Self {
         let [atlas, layers] = [Atlas::packed, Atlas::layered].map(|lay_out| {
             lay_out(plan, max_side).inspect_err(|e| log::info!("no atlas: {e}")).ok()
         });
         let casters = scene.map(|s| casters(plan, s));
         let culled = casters.as_ref().and_then(|c| casters_culled(plan, c));
-        Self { technique, view, chosen_lights, plan, atlas, layers, casters, culled }
+        Self { technique, view, chosen_lights, plan, atlas, layers, casters, culled, fit }
     }
 
     /// x, y, width and height of a map in the atlas, texels; `None` if it has no place there.
@@ -210,6 +225,7 @@ impl<'a> Planned<'a> {
         });
         let lights = plan.lights.iter().zip(self.chosen_lights).map(|(light, chosen)| LightJson {
             name: chosen.name.clone(),
+            light: chosen.info(),
             theta_deg: light.theta_rad.to_degrees(),
             maps: [light.maps.start, light.maps.end],
         });
@@ -224,6 +240,8 @@ impl<'a> Planned<'a> {
             atlas: atlas.map(|a| AtlasJson { size: a.size, gutter: a.gutter_texels }),
             layers: layers.map(|l| LayersJson { size: l.size, count: l.layers }),
             casters_culled: self.culled,
+            fit: self.fit.map(Fit::name),
+            view: self.view.info(),
         }
     }
 
@@ -235,6 +253,13 @@ impl<'a> Planned<'a> {
             let _ = writeln!(text, "{l}");
         };
         line(format_args!("shadows         {}", self.technique));
+        match self.fit {
+            None => {}
+            Some(Fit::Box) => line(format_args!(
+                "fitted to       the box around the scene (--fit surfaces fits closer)"
+            )),
+            Some(fit) => line(format_args!("fitted to       {}", fit.name())),
+        }
         for (light, chosen) in plan.lights.iter().zip(self.chosen_lights) {
             let name =
                 chosen.name.as_deref().filter(|_| self.chosen_lights.len() > 1).unwrap_or("light");

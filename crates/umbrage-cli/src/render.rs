@@ -1,14 +1,14 @@
-//! `umbrage render` renders one picture.
+//! `umbrage render` renders one picture, or several of the same frame.
 
-use crate::args::{self, Aov, PictureKind};
+use crate::args::{self, Aov, PictureArgs, PictureKind};
 use crate::output::note;
 use crate::progress::Bar;
-use crate::setup::{announce, open_scene, tell_notices};
+use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_notices};
 use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
     Certainty, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene,
-    Rows, Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan,
+    Rows, Shadowed, Shape, Texels, check_file, noise, plan,
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
@@ -16,10 +16,9 @@ use umbrage_measure::{
 };
 use umbrage_trace::{AreaLight, View, shade};
 
-/// All data from which a picture can be made. Fields that the requested picture does not need may
-/// stay empty.
+/// All data from which pictures can be made. Fields that no requested picture needs may stay empty.
 #[derive(Default)]
-struct Picture {
+struct Data {
     counted: Vec<bool>,
     truth: Shadowed,
     technique: Shadowed,
@@ -29,7 +28,7 @@ struct Picture {
     certainty: Certainty,
 }
 
-/// Which data a picture needs.
+/// Which data the pictures need.
 #[derive(Clone, Copy)]
 struct Needs {
     truth: bool,
@@ -40,16 +39,19 @@ struct Needs {
 /// Number of frames of the motion that measures minification.
 const FRAMES: u32 = 8;
 
-/// Renders the picture, and writes it to a file.
+/// Renders the pictures, and writes each to its file.
 pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
-    let kind = args.picture_kind()?;
-    check_file(&args.output)?;
-    let scene = open_scene(&args.scene.name)?;
-    let chosen = choose_view(&args.view.options(), Some(&scene))?;
-    let light = choose_light(&args.light.options(), Some(&scene))?.light;
+    let pictures = args.pictures()?;
+    pictures.iter().try_for_each(|p| check_file(&p.path))?;
+    let bar = Bar::of_parts(quiet);
+    let scene = open_scene(&args.scene, &bar)?;
+    let Chosen { view: chosen, lights } =
+        choose(&args.view, &[args.light.options()], Some(&scene), &bar)?;
+    let light = lights[0].light;
+    bar.stage("preparing the scene");
     let backend = args.execution.backend.into();
     let executors = Executors::open(backend, std::slice::from_ref(&args.shadows))?;
-    let render_scene = RenderScene::new(&scene, &executors, args.scene.opaque)?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque)?;
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     if let Some(size) = args.light_size {
@@ -58,26 +60,30 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
     let seen = render_scene.seen(&receivers, &chosen.camera)?;
     let bounds = receivers.bounds(seen.as_ref());
+    bar.stage("planning");
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
-    let needs = Needs::of(args.aov);
+    let needs = Needs::of(&pictures);
     if needs.motion {
         Motion::Away.check(FRAMES, &chosen, light)?;
     }
-    tell_notices(&scene);
-    announce(&executors);
+    bar.aside(|| {
+        tell_notices(&scene);
+        tell_chosen(&chosen, &lights);
+        announce(&executors);
+    });
     if let Size::MaxError(pixels) = args.shadows.technique().size
         && needs.maps
     {
-        note(&format!("texels: {} for at most {pixels} px a texel", plan.texels()));
+        bar.note(&format!("texels: {} for at most {pixels} px a texel", plan.texels()));
     }
     let technique = args.shadows.technique();
     let map_rows = if needs.maps { render_scene.rows(&plan, technique) } else { 0 };
     let height = u64::from(chosen.camera.image()[1]);
-    let bar = Bar::new(map_rows + height * needs.passes(), quiet);
-    let mut picture = Picture::trace(args, needs, &render_scene, &view, &plan, &bar)?;
+    bar.one_part(map_rows + height * needs.passes());
+    let mut data = Data::trace(args, needs, &render_scene, &view, &plan, &bar)?;
     if let Some(size) = args.light_size {
-        let Certainty { pixels, rays, standard_error } = picture.certainty;
-        note(&format!(
+        let Certainty { pixels, rays, standard_error } = data.certainty;
+        bar.note(&format!(
             "truth: a light of {size}, standard error at most {standard_error:.4} by {:.0} shadow \
              rays a pixel",
             rays as f64 / pixels as f64
@@ -88,27 +94,32 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
         let moving = MovingView { scene, receivers, chosen_view, light, samples: 1 };
         let techniques = std::slice::from_ref(&args.shadows);
         let noise = noise(Motion::Away, FRAMES, &moving, techniques, &bar)?.swap_remove(0);
-        picture.noise = noise.pixels;
+        data.noise = noise.pixels;
         if let Some(mean) = noise.mean {
-            note(&format!("noise: {mean:.4} (mean change of a pixel's error between frames)"));
+            bar.note(&format!("noise: {mean:.4} (mean change of a pixel's error between frames)"));
         }
     }
     drop(bar);
-    if (needs.maps || needs.truth) && !picture.counted.contains(&true) {
+    if (needs.maps || needs.truth) && !data.counted.contains(&true) {
         log::warn!("{NOTHING_TO_SHADOW}");
     }
-    match kind {
-        PictureKind::Png => picture.write_png(args, &view),
-        PictureKind::Exr => picture.write_exr(args, chosen.camera.image()),
+    for picture in &pictures {
+        match picture.kind {
+            PictureKind::Png => data.write_png(picture, &view)?,
+            PictureKind::Exr => data.write_exr(picture, chosen.camera.image())?,
+        }
+        note(&format!("wrote: {}", picture.path.display()));
     }
+    Ok(())
 }
 
 impl Needs {
-    fn of(aov: Aov) -> Self {
+    fn of(pictures: &[PictureArgs]) -> Self {
+        let any = |is_so: fn(Aov) -> bool| pictures.iter().any(|p| is_so(p.aov));
         Self {
-            truth: aov.shows_truth(),
-            maps: !matches!(aov, Aov::Truth | Aov::Depth | Aov::Normal),
-            motion: aov == Aov::Minification,
+            truth: any(Aov::shows_truth),
+            maps: any(|aov| !matches!(aov, Aov::Truth | Aov::Depth | Aov::Normal)),
+            motion: any(|aov| aov == Aov::Minification),
         }
     }
 
@@ -119,8 +130,8 @@ impl Needs {
     }
 }
 
-impl Picture {
-    /// Renders all data that the picture needs, except the noise of a motion.
+impl Data {
+    /// Renders all data that the pictures need, except the noise of a motion.
     fn trace<'a>(
         args: &args::Render,
         needs: Needs,
@@ -136,13 +147,13 @@ impl Picture {
             executor.render(plan, &advance)?;
         }
         bar.stage("picture");
-        let mut picture = Self::default();
+        let mut data = Self::default();
         for range in view.bands() {
             let rows = Rows::new(view, range, &advance);
             let truth = match args.light_size.filter(|_| needs.truth) {
                 Some(size) => {
                     let (strip, certainty) = rows.area_truth(size)?;
-                    picture.certainty.add(certainty);
+                    data.certainty.add(certainty);
                     Some(strip)
                 }
                 None => needs.truth.then(|| rows.truth()),
@@ -153,51 +164,56 @@ impl Picture {
                 (_, Some(strip)) => strip,
                 _ => &executor.shape(&rows)?,
             };
-            picture.counted.extend(shape.counted());
+            data.counted.extend(shape.counted());
             if let Some(truth) = &truth {
-                picture.truth.push(truth);
+                data.truth.push(truth);
             }
             if let Some(strip) = &strip {
-                picture.technique.push(strip);
-                picture.texels.push(strip);
+                data.technique.push(strip);
+                data.texels.push(strip);
             }
-            picture.shape.push(strip.as_ref().unwrap_or(shape));
+            data.shape.push(strip.as_ref().unwrap_or(shape));
         }
-        Ok(picture)
+        Ok(data)
     }
 
-    /// Writes the requested picture as a PNG, in colours.
-    fn write_png(self, args: &args::Render, view: &View<'_>) -> Result<()> {
-        let path = &args.output;
+    /// Writes a picture as a PNG, in colours.
+    fn write_png(&self, picture: &PictureArgs, view: &View<'_>) -> Result<()> {
+        let path = &picture.path;
         let size = view.camera().image();
-        let counted = Image::new(size, self.counted)?;
+        let counted = Image::new(size, self.counted.clone())?;
         let rgb = |pixels: Vec<Rgb>| Image::new(size, pixels);
         let gray = |pixels: Vec<f32>| Image::new(size, pixels).map(|i| i.map(|&v| grey(v)));
-        let picture = match args.aov {
-            Aov::Visibility => return Ok(write_png(path, &gray(self.technique.visibility)?)?),
-            Aov::Truth => return Ok(write_png(path, &gray(self.truth.visibility)?)?),
-            Aov::Color => rgb(self.technique.color)?,
+        let colors = match picture.aov {
+            Aov::Visibility => {
+                return Ok(write_png(path, &gray(self.technique.visibility.clone())?)?);
+            }
+            Aov::Truth => return Ok(write_png(path, &gray(self.truth.visibility.clone())?)?),
+            Aov::Color => rgb(self.technique.color.clone())?,
             Aov::Difference => difference_map(
-                &Image::new(size, self.truth.visibility)?,
-                &Image::new(size, self.technique.visibility)?,
+                &Image::new(size, self.truth.visibility.clone())?,
+                &Image::new(size, self.technique.visibility.clone())?,
                 &counted,
-                &rgb(self.truth.color)?,
+                &rgb(self.truth.color.clone())?,
             )?,
             Aov::Error => error_map(
-                &Image::new(size, self.texels.error)?,
+                &Image::new(size, self.texels.error.clone())?,
                 &counted,
-                &rgb(self.technique.color)?,
+                &rgb(self.technique.color.clone())?,
                 ErrorScale::default(),
             )?,
-            Aov::Texels => {
-                texel_map(&Image::new(size, self.texels.texel)?, &rgb(self.technique.color)?)?
-            }
-            Aov::Partition => {
-                partition_map(&Image::new(size, self.texels.map)?, &rgb(self.technique.color)?)?
-            }
-            Aov::Minification => {
-                noise_map(&Image::new(size, self.noise)?, &rgb(self.technique.color)?)?
-            }
+            Aov::Texels => texel_map(
+                &Image::new(size, self.texels.texel.clone())?,
+                &rgb(self.technique.color.clone())?,
+            )?,
+            Aov::Partition => partition_map(
+                &Image::new(size, self.texels.map.clone())?,
+                &rgb(self.technique.color.clone())?,
+            )?,
+            Aov::Minification => noise_map(
+                &Image::new(size, self.noise.clone())?,
+                &rgb(self.technique.color.clone())?,
+            )?,
             Aov::Depth => {
                 let color = |&d: &f32| shade::depth_color(view.camera(), f64::from(d));
                 rgb(self.shape.depth.iter().map(color).collect())?
@@ -207,20 +223,20 @@ impl Picture {
                 rgb(self.shape.normal.iter().map(color).collect())?
             }
         };
-        Ok(write_png(path, &picture)?)
+        Ok(write_png(path, &colors)?)
     }
 
-    /// Writes the requested picture as an EXR, in numbers.
-    fn write_exr(self, args: &args::Render, size: [u32; 2]) -> Result<()> {
-        let path = &args.output;
+    /// Writes a picture as an EXR, in numbers.
+    fn write_exr(&self, picture: &PictureArgs, size: [u32; 2]) -> Result<()> {
+        let path = &picture.path;
         let plane = |values: Vec<f32>| Ok(write_exr(path, &Image::new(size, values)?)?);
         let color = |values: Vec<[f32; 3]>| Ok(write_exr(path, &Image::new(size, values)?)?);
-        match args.aov {
-            Aov::Color => color(self.shape.radiance),
+        match picture.aov {
+            Aov::Color => color(self.shape.radiance.clone()),
             Aov::Normal => color(self.shape.normal.iter().map(glam::Vec3::to_array).collect()),
             Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
-            Aov::Visibility => plane(self.technique.visibility),
-            Aov::Truth => plane(self.truth.visibility),
+            Aov::Visibility => plane(self.technique.visibility.clone()),
+            Aov::Truth => plane(self.truth.visibility.clone()),
             Aov::Difference => {
                 let pairs = self.technique.visibility.iter().zip(&self.truth.visibility);
                 let differences = pairs.zip(&self.counted);
@@ -230,9 +246,9 @@ impl Picture {
                         .collect(),
                 )
             }
-            Aov::Error => plane(self.texels.error),
-            Aov::Minification => plane(self.noise),
-            Aov::Depth => plane(self.shape.depth),
+            Aov::Error => plane(self.texels.error.clone()),
+            Aov::Minification => plane(self.noise.clone()),
+            Aov::Depth => plane(self.shape.depth.clone()),
             Aov::Partition => {
                 plane(self.texels.map.iter().map(|m| m.map_or(-1.0, f32::from)).collect())
             }

@@ -1,14 +1,26 @@
-//! Opens scenes, and prints or logs messages about scenes and backends.
+//! Opens scenes, chooses views and lights, and prints or logs messages about all of them.
 
-use crate::output::note;
+use crate::args::{SceneArgs, SceneChangeArgs, ViewArgs};
+use crate::output::{note, six_digits};
+use crate::progress::Bar;
 use anyhow::Result;
+use glam::DVec3;
 use std::path::Path;
-use umbrage_lab::Executors;
-use umbrage_scene::Scene;
+use umbrage::Light;
+use umbrage_lab::{
+    ChosenLight, ChosenView, Defaults, Executors, LightOptions, Progress, choose_light, choose_view,
+};
+use umbrage_scene::{Lens, Scene, SceneCamera};
 
-/// Opens the scene with this name, and logs its size.
-pub(crate) fn open_scene(name: &str) -> Result<Scene> {
-    let scene = umbrage_lab::open_scene(Path::new(""), name)?;
+/// Opens a scene, changes it as asked for, and logs its size.
+pub(crate) fn open_scene(args: &SceneArgs, bar: &Bar) -> Result<Scene> {
+    open_changed(&args.name, &args.changes, bar)
+}
+
+/// Does the same as [`open_scene`] where a scene may be left out.
+pub(crate) fn open_changed(name: &str, changes: &SceneChangeArgs, bar: &Bar) -> Result<Scene> {
+    bar.stage(&format!("opening {name}"));
+    let scene = umbrage_lab::open_scene(Path::new(""), name, &changes.options())?;
     log_size(name, &scene);
     Ok(scene)
 }
@@ -24,18 +36,88 @@ pub(crate) fn log_size(name: &str, scene: &Scene) {
     );
 }
 
-/// Warns of everything that was repaired when the scene was loaded.
+/// A view and the lights in it.
+pub(crate) struct Chosen {
+    pub(crate) view: ChosenView,
+    /// As many as were asked for.
+    pub(crate) lights: Vec<ChosenLight>,
+}
+
+/// Chooses the view and the lights that are asked for.
+pub(crate) fn choose(
+    view: &ViewArgs,
+    lights: &[LightOptions],
+    scene: Option<&Scene>,
+    bar: &Bar,
+) -> Result<Chosen> {
+    bar.stage("choosing view and light");
+    let defaults = Defaults::of(scene);
+    let view = choose_view(&view.options(), &defaults)?;
+    let lights = lights.iter().map(|light| choose_light(light, &defaults));
+    Ok(Chosen { view, lights: lights.collect::<Result<_, _>>()? })
+}
+
+/// Warns of everything that was repaired when the scene was loaded, or that the scene's size does
+/// not follow from.
 pub(crate) fn tell_notices(scene: &Scene) {
-    for notice in &scene.notices {
+    for notice in scene.all_notices() {
         log::warn!("{}: {}", scene.name, notice.0);
     }
 }
 
-/// Prints which backend renders, if the program chose it and not the user.
-pub(crate) fn announce(executors: &Executors) {
-    if let Some(choice) = executors.choice() {
-        tell_backend(choice);
+/// Prints which view and which lights were taken, and warns of what the view cuts away.
+pub(crate) fn tell_chosen(view: &ChosenView, lights: &[ChosenLight]) {
+    for notice in &view.notices {
+        log::warn!("{notice}");
     }
+    note(&format!("view: {}", view_words(view)));
+    for light in lights {
+        note(&format!("light: {}", light_words(light)));
+    }
+}
+
+/// A view in the words of the command line.
+pub(crate) fn view_words(view: &ChosenView) -> String {
+    let SceneCamera { eye, target, up, lens, near, far, .. } = view.view;
+    let [width, height] = view.camera.image();
+    let lens = match lens {
+        Lens::Perspective { fov_y_rad } => format!("--fov {}", six_digits(fov_y_rad.to_degrees())),
+        Lens::Orthographic { height } => format!("--ortho {}", six_digits(height)),
+    };
+    let camera = view.name.as_ref().map_or(String::new(), |name| format!("camera `{name}`, "));
+    format!(
+        "{camera}--eye={} --target={} --up={} {lens} --near {} --far {} --size {width}x{height}",
+        point(eye),
+        point(target),
+        point(up),
+        six_digits(near),
+        six_digits(far)
+    )
+}
+
+/// A light in words: its name, if it has one, and where it shines from.
+pub(crate) fn light_words(light: &ChosenLight) -> String {
+    let name = light.name.as_ref().map_or(String::new(), |name| format!("`{name}`, "));
+    let shines = match light.light {
+        Light::Directional { direction } => {
+            format!("--sun={}", point(direction.normalize_or_zero()))
+        }
+        Light::Spot(spot) => {
+            format!("a spot light at {} towards {}", point(spot.position), point(spot.direction))
+        }
+        Light::Point(lamp) => format!("a point light at {}", point(lamp.position)),
+    };
+    name + &shines
+}
+
+fn point(p: DVec3) -> String {
+    let [x, y, z] = p.to_array().map(six_digits);
+    format!("{x},{y},{z}")
+}
+
+/// Prints which backend renders.
+pub(crate) fn announce(executors: &Executors) {
+    tell_backend(executors.choice());
 }
 
 /// Prints which backend was chosen.

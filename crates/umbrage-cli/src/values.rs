@@ -22,6 +22,14 @@ pub(crate) fn direction(text: &str) -> Result<DVec3> {
     values::pointing(vector(text)?).map_err(Error::msg)
 }
 
+/// Parses the azimuth and the elevation of a sun, degrees, and gives the direction in which its
+/// light travels.
+pub(crate) fn sun_angles(text: &str) -> Result<DVec3> {
+    let number = |n: &str| n.trim().parse().unwrap_or(f64::NAN);
+    let angles = text.split_once(',').map_or([f64::NAN; 2], |(a, e)| [number(a), number(e)]);
+    values::sun_direction(angles).map_err(Error::msg)
+}
+
 /// Parses a positive distance in metres.
 pub(crate) fn distance(text: &str) -> Result<f64> {
     values::metres(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
@@ -70,6 +78,11 @@ mod tests {
     #[test]
     fn good_values() {
         assert_eq!(vector("-1,2.5,1e3").unwrap(), DVec3::new(-1.0, 2.5, 1e3));
+        // In the evening the sun is in the west, and its light travels east.
+        let evening = sun_angles("270,30").unwrap();
+        let expected = DVec3::new(3f64.sqrt() / 2.0, -0.5, 0.0);
+        assert!(evening.distance(expected) < 1e-12, "{evening}");
+        assert!(sun_angles("0,0").unwrap().distance(DVec3::Z) < 1e-12, "from the north");
         assert_eq!(distance("0.25").unwrap(), 0.25);
         assert_eq!(pixels_per_texel("1.5").unwrap(), 1.5);
         assert_eq!(field_of_view("60").unwrap(), 60.0);
@@ -90,6 +103,9 @@ mod tests {
         for text in ["", "0", "-1", "nan", "inf", "1e13", "1m"] {
             assert!(distance(text).is_err(), "{text}");
             assert!(pixels_per_texel(text).is_err(), "{text}");
+        }
+        for text in ["", "1", "1,2,3", "a,2", "1,nan", "inf,1", "0,91", "361,0"] {
+            assert!(sun_angles(text).is_err(), "{text}");
         }
         for text in ["", "0", "180", "-60", "nan"] {
             assert!(field_of_view(text).is_err(), "{text}");

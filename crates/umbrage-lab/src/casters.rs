@@ -16,7 +16,9 @@ pub struct MapCasters {
 /// Counts the triangles that may cast into each of the plan's maps, and those that cannot.
 pub fn casters(plan: &Plan, scene: &Scene) -> Vec<MapCasters> {
     let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
-    let instances: Vec<(Aabb, u64)> = scene.instance_boxes().into_iter().zip(triangles).collect();
+    let boxes = scene.instance_boxes().into_iter().zip(triangles).enumerate();
+    let casting = boxes.filter(|&(i, _)| scene.roles.of(i).casts);
+    let instances: Vec<(Aabb, u64)> = casting.map(|(_, instance)| instance).collect();
     let of_map = |map: &ShadowMap| {
         instances.iter().fold(MapCasters::default(), |mut sum, &(aabb, triangles)| {
             *(if map.may_cast(aabb) { &mut sum.drawn } else { &mut sum.culled }) += triangles;

@@ -112,8 +112,8 @@ impl<'a> Comparison<'a> {
         light: &LightOptions,
         options: &'a ComparisonOptions,
     ) -> Result<Self, Error> {
-        let chosen_view = choose_view(view, Some(prepared.scene))?;
-        let chosen_light = choose_light(light, Some(prepared.scene))?;
+        let chosen_view = choose_view(view, &prepared.defaults)?;
+        let chosen_light = choose_light(light, &prepared.defaults)?;
         let (camera, light) = (chosen_view.camera, chosen_light.light);
         let view = View::new(prepared.render.tracer(), camera, light, options.samples)
             .about(Field::Samples)?;
@@ -125,6 +125,16 @@ impl<'a> Comparison<'a> {
         let plan = |t| planning::timed_plan(t, &camera, &light, &bounds);
         let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;
         Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
+    }
+
+    /// Returns the view that was chosen.
+    pub fn chosen_view(&self) -> &ChosenView {
+        &self.chosen_view
+    }
+
+    /// Returns the light that was chosen.
+    pub fn chosen_light(&self) -> &ChosenLight {
+        &self.chosen_light
     }
 
     /// Checks that every frame of a motion has a valid view and light.
@@ -284,7 +294,7 @@ impl Compared<'_> {
                 truth: &truth_pictures,
                 pictures: &pictures,
                 scale: ErrorScale::default(),
-                notices: &prepared.notices(),
+                notices: &[prepared.notices(), chosen_view.notices.clone()].concat(),
                 command: Some(command),
             },
         )?;

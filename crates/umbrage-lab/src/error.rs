@@ -31,6 +31,8 @@ pub enum Field {
     Camera,
     /// Direction in which parallel light travels.
     Sun,
+    /// Azimuth and elevation of the sun.
+    SunAngles,
     /// A light of the scene.
     Light,
     /// A technique.
@@ -45,6 +47,10 @@ pub enum Field {
     Fit,
     /// Whether alpha-masked materials are treated as solid.
     Opaque,
+    /// Nodes of the scene that are left out.
+    Without,
+    /// Whether ground is put under the scene.
+    Ground,
     /// The backend that renders.
     Backend,
     /// The motion of the viewer or the light.
@@ -74,6 +80,7 @@ impl Field {
             Self::Size => "size",
             Self::Camera => "camera",
             Self::Sun => "sun",
+            Self::SunAngles => "sun-angles",
             Self::Light => "light",
             Self::Shadows => "shadows",
             Self::MaxError => "max-error",
@@ -81,6 +88,8 @@ impl Field {
             Self::LightSize => "light-size",
             Self::Fit => "fit",
             Self::Opaque => "opaque",
+            Self::Without => "without",
+            Self::Ground => "ground",
             Self::Backend => "backend",
             Self::Motion => "motion",
             Self::Output => "output",
@@ -92,8 +101,11 @@ impl Field {
 
     /// Returns whether the views in a sweep's file have this field, with its name as the key.
     pub(crate) fn is_of_view(self) -> bool {
-        use Field::{Camera, Eye, Far, Fov, Light, Near, Ortho, Scene, Size, Sun, Target, Up};
-        [Scene, Eye, Target, Up, Fov, Ortho, Near, Far, Size, Camera, Sun, Light].contains(&self)
+        use Field::{
+            Camera, Eye, Far, Fov, Light, Near, Ortho, Scene, Size, Sun, SunAngles, Target, Up,
+        };
+        [Scene, Eye, Target, Up, Fov, Ortho, Near, Far, Size, Camera, Sun, SunAngles, Light]
+            .contains(&self)
     }
 }
 

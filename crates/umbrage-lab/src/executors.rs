@@ -19,7 +19,7 @@ pub enum Backend {
 /// The available executors: always the CPU reference, and a GPU if one was opened.
 pub struct Executors {
     gpu: Option<Gpu>,
-    choice: Option<String>,
+    choice: String,
 }
 
 /// Names of the two backends in reports.
@@ -36,7 +36,9 @@ impl Executors {
         let log = techniques.iter().find(|t| !runs_on_gpu(t.technique()));
         let wrong = |problem: String| Err(Error::field(Field::Backend, problem));
         match backend {
-            Backend::Reference => Ok(Self { gpu: None, choice: None }),
+            Backend::Reference => {
+                Ok(Self { gpu: None, choice: "reference, on the CPU".to_owned() })
+            }
             Backend::Gpu => {
                 if let Some(log) = log {
                     return wrong(format!(
@@ -44,31 +46,30 @@ impl Executors {
                     ));
                 }
                 match Gpu::open() {
-                    Ok(gpu) => Ok(Self { gpu: Some(gpu), choice: None }),
+                    Ok(gpu) => Ok(Self { choice: described(&gpu), gpu: Some(gpu) }),
                     Err(e) => wrong(format!("{e}; take reference")),
                 }
             }
             Backend::Auto if log.is_some() && techniques.len() == 1 => Ok(Self {
                 gpu: None,
-                choice: Some("reference, on the CPU (no GPU rasterises `log`)".to_owned()),
+                choice: "reference, on the CPU (no GPU rasterises `log`)".to_owned(),
             }),
             Backend::Auto => Ok(match Gpu::open() {
                 Ok(gpu) => {
-                    let software = if gpu.is_software() { ", in software" } else { "" };
                     let log = log.map_or(String::new(), |t| {
                         format!("; reference for `{t}`, which no GPU rasterises")
                     });
-                    let choice = format!("gpu, {}{software}{log}", gpu.info().name);
-                    Self { gpu: Some(gpu), choice: Some(choice) }
+                    let choice = described(&gpu) + &log;
+                    Self { gpu: Some(gpu), choice }
                 }
-                Err(e) => Self { gpu: None, choice: Some(format!("reference, on the CPU ({e})")) },
+                Err(e) => Self { gpu: None, choice: format!("reference, on the CPU ({e})") },
             }),
         }
     }
 
-    /// Returns a line that tells the user what renders; `None` if the user chose the backend.
-    pub fn choice(&self) -> Option<&str> {
-        self.choice.as_deref()
+    /// Returns a line that tells the user what renders.
+    pub fn choice(&self) -> &str {
+        &self.choice
     }
 
     /// Returns the GPU, if one was opened.
@@ -86,6 +87,12 @@ impl Executors {
     pub fn device(&self) -> Option<String> {
         self.gpu.as_ref().map(|gpu| gpu.info().name.clone())
     }
+}
+
+/// Tells which GPU it is.
+fn described(gpu: &Gpu) -> String {
+    let software = if gpu.is_software() { ", in software" } else { "" };
+    format!("gpu, {}{software}", gpu.info().name)
 }
 
 /// Returns whether a GPU can render the technique. None can with the `log` warp, whose rows bend.

@@ -27,7 +27,7 @@
 //! use std::path::Path;
 //! use umbrage_lab::{
 //!     Backend, Comparison, ComparisonOptions, Executors, Fit, LightOptions, PreparedScene,
-//!     ViewOptions, open_scene,
+//!     SceneOptions, ViewOptions, open_scene,
 //! };
 //!
 //! let options = ComparisonOptions {
@@ -36,7 +36,7 @@
 //!     light_size: None,
 //! };
 //! let view = ViewOptions { size: [48, 27], ..ViewOptions::default() };
-//! let scene = open_scene(Path::new(""), "pole")?;
+//! let scene = open_scene(Path::new(""), "pole", &SceneOptions::default())?;
 //! let executors = Executors::open(Backend::Reference, &options.techniques)?;
 //! let prepared = PreparedScene::new(&scene, &executors, false, Fit::Surfaces)?;
 //! let comparison = Comparison::new(&prepared, &view, &LightOptions::default(), &options)?;
@@ -51,6 +51,7 @@
 mod bencher;
 mod casters;
 mod comparison;
+mod defaults;
 mod error;
 mod executor;
 mod executors;
@@ -72,6 +73,7 @@ mod view;
 pub use bencher::{Bencher, Costs};
 pub use casters::{MapCasters, casters, casters_culled};
 pub use comparison::{Compared, Comparison, ComparisonOptions};
+pub use defaults::Defaults;
 pub use error::{Difference, Error, Field};
 pub use executor::{Executor, RenderScene};
 pub use executors::{Backend, Executors};
@@ -83,7 +85,7 @@ pub use planning::{milliseconds, plan, plan_with, planner};
 pub use prepared::PreparedScene;
 pub use progress::Progress;
 pub use receivers::{Fit, Receivers};
-pub use scene::open_scene;
+pub use scene::{SceneOptions, open_scene};
 pub use strip::{Certainty, NOTHING_TO_SHADOW, Rows, Strip};
 pub use sweep::{Share, SweepOptions, join_shares, sweep};
 pub use technique::{NamedTechnique, TechniqueError};

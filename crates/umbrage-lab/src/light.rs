@@ -1,24 +1,25 @@
 //! Lights: the options that a user may give, and the light that follows from them.
 
+use crate::defaults::Defaults;
 use crate::error::{Error, Field};
 use crate::scene::find;
 use crate::values;
 use glam::DVec3;
 use umbrage::Light;
 use umbrage_measure::LightInfo;
-use umbrage_scene::Scene;
 
 /// Direction of afternoon light: 45° high, from the side and a little from behind a viewer who
 /// looks along −z.
 const AFTERNOON_SUN: DVec3 = DVec3::new(-0.6, -1.0, -0.8);
 
-/// The light that a user asks for. Without one, [`Scene::default_light`] or, without a scene, an
+/// The light that a user asks for. Without one,
+/// [`Scene::default_light`](umbrage_scene::Scene::default_light) or, without a scene, an
 /// afternoon sun at 45°.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightOptions {
     /// Direction in which parallel light travels, of any length; cannot be combined with `light`.
     pub sun: Option<DVec3>,
-    /// Name of a light of the scene.
+    /// A light of the scene, by a word that [chooses](umbrage_scene::Choices) it.
     pub light: Option<String>,
 }
 
@@ -38,10 +39,10 @@ impl LightOptions {
     }
 }
 
-/// A light, and its name in the scene if it comes from there.
+/// A light, and the word that chooses it if it comes from the scene.
 #[derive(Clone, Debug)]
 pub struct ChosenLight {
-    /// Name of the light in the scene, if it comes from there.
+    /// The word that chooses the light, if it comes from the scene.
     pub name: Option<String>,
     /// The light itself.
     pub light: Light,
@@ -72,20 +73,25 @@ impl ChosenLight {
 /// Returns the light that is asked for or, if there is none, the scene's default light.
 ///
 /// # Errors
-/// An error if the scene has no light of that name.
-pub fn choose_light(options: &LightOptions, scene: Option<&Scene>) -> Result<ChosenLight, Error> {
+/// An error if the scene has no such light.
+pub fn choose_light(options: &LightOptions, defaults: &Defaults<'_>) -> Result<ChosenLight, Error> {
     if let Some(direction) = options.sun {
         return Ok(ChosenLight { name: None, light: Light::Directional { direction } });
     }
-    let Some(scene) = scene else {
+    let Some(scene) = defaults.scene() else {
         let light = Light::Directional { direction: AFTERNOON_SUN };
         return Ok(ChosenLight { name: None, light });
     };
-    let Some(name) = &options.light else {
-        let found = scene.default_light();
-        let name = scene.lights.contains(&found).then_some(found.name);
-        return Ok(ChosenLight { name, light: found.light });
+    let choices = scene.light_choices();
+    let index = match &options.light {
+        Some(word) => Some(find(Field::Light, word, &choices)?),
+        None => scene.lights.iter().position(|l| l.intensity > 0.0),
     };
-    let index = find(Field::Light, name, scene.lights.iter().map(|l| l.name.as_str()))?;
-    Ok(ChosenLight { name: Some(name.clone()), light: scene.lights[index].light })
+    Ok(match index {
+        Some(index) => ChosenLight {
+            name: choices.words(index).into_iter().next(),
+            light: scene.lights[index].light,
+        },
+        None => ChosenLight { name: None, light: defaults.light(scene).light },
+    })
 }

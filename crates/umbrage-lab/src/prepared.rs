@@ -1,5 +1,6 @@
 //! A scene that is ready for comparisons.
 
+use crate::defaults::Defaults;
 use crate::error::Error;
 use crate::executor::RenderScene;
 use crate::executors::Executors;
@@ -12,6 +13,7 @@ pub struct PreparedScene<'a> {
     pub(crate) executors: &'a Executors,
     pub(crate) render: RenderScene<'a>,
     pub(crate) receivers: Receivers,
+    pub(crate) defaults: Defaults<'a>,
     opaque: bool,
 }
 
@@ -30,12 +32,13 @@ impl<'a> PreparedScene<'a> {
     ) -> Result<Self, Error> {
         let render = RenderScene::new(scene, executors, opaque)?;
         let receivers = Receivers::new(scene, render.tracer(), fit);
-        Ok(Self { scene, executors, render, receivers, opaque })
+        let defaults = Defaults::of(Some(scene));
+        Ok(Self { scene, executors, render, receivers, defaults, opaque })
     }
 
     /// Returns the notices for readers of a report.
     pub(crate) fn notices(&self) -> Vec<String> {
-        let mut notices: Vec<String> = self.scene.notices.iter().map(|n| n.0.clone()).collect();
+        let mut notices: Vec<String> = self.scene.all_notices().into_iter().map(|n| n.0).collect();
         if self.opaque {
             notices
                 .push("Alpha masks are ignored: masked materials show and cast as solid.".into());

@@ -1,3 +1,5 @@
+use crate::light::ChosenLight;
+use crate::view::ChosenView;
 use umbrage_scene::Scene;
 
 /// Receives the progress of a job, on any thread. By default each method does nothing, and `()`
@@ -24,13 +26,16 @@ pub trait Progress: Sync {
     /// The part is done.
     fn end_part(&self) {}
 
+    /// The view and the light of a part were chosen.
+    fn chosen(&self, _view: &ChosenView, _light: &ChosenLight) {}
+
     /// The scene of this name was read. It may have notices for the user.
     fn scene(&self, _name: &str, _scene: &Scene) {}
 
     /// A view of a sweep failed with this error.
     fn failed(&self, _view: &str, _error: &str) {}
 
-    /// The backend was chosen automatically. The text says what renders.
+    /// The backend was opened. The text says what renders.
     fn backend(&self, _choice: &str) {}
 
     /// A line of information for the user.

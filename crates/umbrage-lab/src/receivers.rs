@@ -32,6 +32,7 @@ impl Fit {
 /// The receivers of a scene, as the planner gets them.
 pub struct Receivers {
     all: Aabb,
+    casters: Aabb,
     parts: Option<BoxTree>,
     fit: Fit,
 }
@@ -51,7 +52,10 @@ impl Receivers {
 
     /// Returns the bounding box of the scene as the only receiver. This needs no tracer.
     pub fn in_box(scene: &Scene) -> Self {
-        Self { all: scene.bounds(), parts: None, fit: Fit::Box }
+        let all = scene.bounds();
+        let is_all = scene.roles.are_default();
+        let casters = if is_all { all } else { scene.caster_bounds() };
+        Self { all, casters, parts: None, fit: Fit::Box }
     }
 
     /// Returns whether the maps are fitted to what is seen.
@@ -86,6 +90,11 @@ impl Receivers {
     /// [seen](Self::seen).
     pub fn bounds<'a>(&'a self, seen: Option<&'a SeenTiles>) -> Bounds<'a> {
         let seen = seen.map(|tiles| Seen { tiles, moving: &[], clearance: 0.0 });
-        Bounds { receiver_parts: self.parts.as_ref(), seen, ..Bounds::of_scene(self.all) }
+        Bounds {
+            receivers: Some(self.all),
+            receiver_parts: self.parts.as_ref(),
+            seen,
+            casters: Some(self.casters),
+        }
     }
 }

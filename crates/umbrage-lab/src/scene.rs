@@ -1,23 +1,72 @@
-//! Finds scenes, cameras and lights by their names.
+//! Opens scenes, and finds cameras and lights by the words that choose them.
 
 use crate::error::{About, Error, Field};
 use std::path::{Path, PathBuf};
-use umbrage_scene::{Scene, SceneError, builtins};
+use umbrage_scene::{Choices, LeftOut, Scene, SceneError, builtins};
+
+/// How a scene is changed once it is opened.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SceneOptions {
+    /// Nodes that are left out, in the words `NAME`, `NAME:casting` or `NAME:receiving`. A name is
+    /// that of a node, or its number in the scene, such as `#2`. It stands for all nodes of that
+    /// name, with all nodes below them.
+    pub without: Vec<String>,
+    /// Whether ground is put under the scene.
+    pub ground: bool,
+}
+
+impl SceneOptions {
+    /// Changes a scene.
+    ///
+    /// # Errors
+    /// An error if the scene has no such node, or if nothing is left of it.
+    pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
+        for text in &self.without {
+            let (name, what) = match text.rsplit_once(':') {
+                Some((name, "casting")) => (name, LeftOut::Casting),
+                Some((name, "receiving")) => (name, LeftOut::Receiving),
+                _ => (text.as_str(), LeftOut::Both),
+            };
+            let nodes = scene.nodes_called(name);
+            if nodes.is_empty() {
+                let choices = scene.node_choices();
+                let problem = match choices.is_empty() {
+                    true => format!("the scene has no node `{name}`, nor any other"),
+                    false => {
+                        format!("the scene has no node `{name}`; there are {}", listed(&choices))
+                    }
+                };
+                return Err(Error::field(Field::Without, problem));
+            }
+            scene.leave_out(&nodes, what);
+        }
+        if scene.bounds().is_empty() {
+            return Err(Error::field(Field::Without, "nothing is left to see"));
+        }
+        if self.ground {
+            scene.add_ground();
+        }
+        Ok(())
+    }
+}
 
 /// Opens the scene of this name: a file, relative to `folder`, or else a built-in scene, whose name
-/// is written `name` or `name:size`.
+/// is written `name` or `name:size`. Then changes it as `options` say.
 ///
 /// # Errors
 /// An error if there is neither a file nor a built-in scene of this name, if the file cannot be
-/// read, or if the scene has no triangles to draw.
-pub fn open_scene(folder: &Path, name: &str) -> Result<Scene, Error> {
-    let scene = match scene_file(folder, name) {
+/// read, if the scene has no triangles to draw, or if it has nothing that is to be left out.
+pub fn open_scene(folder: &Path, name: &str, options: &SceneOptions) -> Result<Scene, Error> {
+    let mut scene = match scene_file(folder, name) {
         Some(path) => umbrage_scene::load(&path)?,
         None => built_in(folder, name)?,
     };
     match scene.drawn_triangles() {
         0 => Err(Error::field(Field::Scene, format!("{name} has no triangles to draw"))),
-        _ => Ok(scene),
+        _ => {
+            options.apply(&mut scene)?;
+            Ok(scene)
+        }
     }
 }
 
@@ -70,19 +119,31 @@ pub(crate) fn digest(folder: &Path, name: &str) -> Option<String> {
     Some(sha.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// Returns the index of `name` among the names of a scene's cameras or lights.
+/// Returns the index of the camera or light that a word chooses.
 ///
 /// # Errors
-/// An error that lists all names, if `name` is not among them.
-pub(crate) fn find<'a>(
-    field: Field,
-    name: &str,
-    names: impl Iterator<Item = &'a str>,
-) -> Result<usize, Error> {
-    let names: Vec<&str> = names.collect();
-    let none = || match names.join(", ") {
-        all if all.is_empty() => format!("the scene has no {field} `{name}`, nor any other"),
-        all => format!("the scene has no {field} `{name}`; there are {all}"),
-    };
-    names.iter().position(|n| *n == name).ok_or_else(|| Error::field(field, none()))
+/// An error that lists the words that choose one.
+pub(crate) fn find(field: Field, word: &str, choices: &Choices<'_>) -> Result<usize, Error> {
+    choices.find(word).ok_or_else(|| {
+        let problem = match (choices.len(), choices.bearers(word)) {
+            (0, _) => format!("the scene has no {field} `{word}`, nor any other"),
+            (_, 0) => format!("the scene has no {field} `{word}`; there are {}", listed(choices)),
+            (_, n) => format!(
+                "the scene has {n} of the name `{word}`, which chooses none; there are {}",
+                listed(choices)
+            ),
+        };
+        Error::field(field, problem)
+    })
+}
+
+/// The words that choose each of a list, for an error.
+fn listed(choices: &Choices<'_>) -> String {
+    const MOST: usize = 20;
+    let words = |i: usize| choices.words(i).join(" or ");
+    let mut listed: Vec<String> = (0..choices.len().min(MOST)).map(words).collect();
+    if choices.len() > MOST {
+        listed.push(format!("{} more, up to #{}", choices.len() - MOST, choices.len()));
+    }
+    listed.join(", ")
 }

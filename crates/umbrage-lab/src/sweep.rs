@@ -11,7 +11,7 @@ use crate::folder::ReportFolder;
 use crate::prepared::PreparedScene;
 use crate::progress::Progress;
 use crate::receivers::Fit;
-use crate::scene::{digest, open_scene};
+use crate::scene::{SceneOptions, digest, open_scene};
 use crate::strip::NOTHING_TO_SHADOW;
 use folder::{Inputs, SweepFolder, VERSION};
 use std::collections::HashMap;
@@ -41,6 +41,8 @@ pub struct SweepOptions {
     pub backend: Backend,
     /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
     pub opaque: bool,
+    /// How the scenes are changed.
+    pub scene: SceneOptions,
     /// Size of the pictures, pixels, for views that give no size of their own.
     pub size: [u32; 2],
     /// Command that makes the results again. The page shows it for readers to copy.
@@ -142,6 +144,8 @@ fn begin(options: &SweepOptions) -> Result<Begun, Error> {
         samples: comparison.samples,
         light_size: comparison.light_size.map(|size| size.to_string()),
         opaque: options.opaque,
+        without: options.scene.without.clone(),
+        ground: options.scene.ground,
         fit: options.fit.name().into(),
         backend: executors.name().into(),
     };
@@ -222,15 +226,13 @@ fn compare_missing(
         progress.note(&format!("{done} of {} views are done already", views.len()));
     }
     folder.remove_tables()?;
-    if let Some(choice) = executors.choice() {
-        progress.backend(choice);
-    }
+    progress.backend(executors.choice());
     progress.parts(pending.len() as u64);
     let told = |error: Error| in_words_of_the_file(&error, options.words);
     let mut number = done;
     for pending in pending.chunk_by(|a, b| a.inputs.view.scene == b.inputs.view.scene) {
         let name = &pending[0].inputs.view.scene;
-        let scene = open_scene(scenes, name).map_err(told);
+        let scene = open_scene(scenes, name, &options.scene).map_err(told);
         if let Ok(scene) = &scene {
             progress.scene(name, scene);
         }
@@ -286,6 +288,7 @@ fn compare(
         Comparison::new(prepared, &view, &light, &options.comparison).map_err(told)
     });
     let compared = comparison.as_ref().map_err(Clone::clone).and_then(|comparison| {
+        progress.chosen(comparison.chosen_view(), comparison.chosen_light());
         progress.rows(comparison.rows());
         comparison.trace(progress).map_err(told)
     });

@@ -51,6 +51,25 @@ pub fn opening(degrees: f64) -> Result<f64, String> {
     }
 }
 
+/// Returns the direction in which the light of a sun travels, a unit vector, from where the sun
+/// stands: its azimuth, clockwise from north as seen from above, and its elevation above the
+/// horizon, degrees. North is −z and east is +x.
+///
+/// # Errors
+/// An error if the azimuth is not from −360 to 360, or the elevation not from −90 to 90.
+pub fn sun_direction([azimuth_deg, elevation_deg]: [f64; 2]) -> Result<DVec3, String> {
+    if !(azimuth_deg.abs() <= 360.0 && elevation_deg.abs() <= 90.0) {
+        return Err(
+            "must be an azimuth of -360 to 360 degrees, clockwise from north (-z), and an \
+                    elevation of -90 to 90 degrees above the horizon, as in 225,40"
+                .to_owned(),
+        );
+    }
+    let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+    let (height, reach) = elevation_deg.to_radians().sin_cos();
+    Ok(DVec3::new(-sin * reach, -height, cos * reach))
+}
+
 /// Checks the width and height of a picture, pixels.
 ///
 /// # Errors

@@ -1,11 +1,19 @@
 //! Views: the options that a user may give, and the view that follows from them.
 
+use crate::defaults::Defaults;
 use crate::error::{Error, Field};
 use crate::scene::find;
 use crate::values;
 use glam::DVec3;
 use umbrage::{Aabb, Camera};
 use umbrage_scene::{Lens, Scene, SceneCamera};
+
+/// Largest ratio of far to near distance that is chosen. Depths beyond it have hardly any digits
+/// left near the viewer.
+const MAX_DEPTH_RATIO: f64 = 1e6;
+/// The near distance that is chosen, as a share of the least depth of any surface, so that rounding
+/// cuts nothing away.
+const BEFORE_THE_NEAREST: f64 = 0.99;
 
 /// Default values of a view, for what neither the user nor the scene gives.
 const DEFAULT_VIEW: SceneCamera = SceneCamera {
@@ -40,7 +48,7 @@ pub struct ViewOptions {
     pub far: Option<f64>,
     /// Width and height of the picture, pixels; 1 to 16384 each, at most 2²⁶ pixels in all.
     pub size: [u32; 2],
-    /// Name of a camera of the scene.
+    /// A camera of the scene, by a word that [chooses](umbrage_scene::Choices) it.
     pub camera: Option<String>,
 }
 
@@ -103,24 +111,32 @@ impl ViewOptions {
 /// A view, and the camera of the scene that it comes from, if any.
 #[derive(Clone, Debug)]
 pub struct ChosenView {
-    /// Name of the scene's camera, if the view is that of a camera and was not changed.
+    /// The word that chooses the scene's camera, if the view is that of a camera and was not
+    /// changed.
     pub name: Option<String>,
     /// The view's eye, target, lens and depth range.
     pub view: SceneCamera,
     /// The same view in the form that the planner takes, with the picture's size.
     pub camera: Camera,
+    /// What the user should know of the view: what its near plane cuts away.
+    pub notices: Vec<String>,
 }
 
 impl ChosenView {
     /// Returns the view in the form that reports show.
     pub fn info(&self) -> umbrage_measure::View {
-        let SceneCamera { eye, target, up, lens, near, far, .. } = self.view;
+        Self::info_of(self.name.clone(), &self.view)
+    }
+
+    /// Returns any view in the form that reports show.
+    pub fn info_of(name: Option<String>, view: &SceneCamera) -> umbrage_measure::View {
+        let &SceneCamera { eye, target, up, lens, near, far, .. } = view;
         let (fov, ortho) = match lens {
             Lens::Perspective { fov_y_rad } => (Some(fov_y_rad.to_degrees()), None),
             Lens::Orthographic { height } => (None, Some(height)),
         };
         umbrage_measure::View {
-            name: self.name.clone(),
+            name,
             eye: eye.to_array(),
             target: target.to_array(),
             up: up.to_array(),
@@ -133,17 +149,19 @@ impl ChosenView {
 }
 
 /// Returns the view that is asked for. Values that are left out come from the scene's camera. If
-/// both the eye and the target are given, only the depth range comes from the scene.
+/// both the eye and the target are given, only the depth range comes from the scene. A near distance
+/// that neither the user nor the scene's file gives is less than the depth of whatever lies before
+/// the eye.
 ///
 /// # Errors
-/// An error if the scene has no camera of that name, or if the view is not one that a camera can
-/// have.
-pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<ChosenView, Error> {
+/// An error if the scene has no such camera, or if the view is not one that a camera can have.
+pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<ChosenView, Error> {
+    let scene = defaults.scene();
     let own = match (scene, options.eye, options.target) {
         (None, ..) | (_, Some(_), Some(_)) => None,
-        (Some(scene), ..) => Some(scene_camera(options, scene)?),
+        (Some(scene), ..) => Some(own_camera(options, scene, defaults)?),
     };
-    let base = own.clone().unwrap_or(DEFAULT_VIEW);
+    let base = own.as_ref().map_or(DEFAULT_VIEW, |own| own.camera.clone());
     let lens = match (options.fov_deg, options.ortho) {
         (Some(deg), _) => Lens::Perspective { fov_y_rad: deg.to_radians() },
         (None, Some(height)) => Lens::Orthographic { height },
@@ -159,44 +177,80 @@ pub fn choose_view(options: &ViewOptions, scene: Option<&Scene>) -> Result<Chose
         name: base.name,
     };
     let moved = options.eye.is_some() || options.target.is_some();
-    if let Some(scene) = scene
-        && moved
-    {
-        let [near, far] = depth_range(&view, options.size, scene.bounds());
-        view.far = options.far.unwrap_or(far.max(options.near.unwrap_or(0.0) * 2.0));
-        view.near = options.near.unwrap_or(near.min(view.far / 2.0));
+    let mut notices = Vec::new();
+    let is_from_file = own.as_ref().is_some_and(|own| own.word.is_some()) && !moved;
+    if let Some(scene) = scene {
+        let end = || end_of(&view, scene.bounds());
+        let far = match options.far {
+            None if moved => Some(end()),
+            // A camera of the file may reach as far as the sky, on which no map is spent.
+            None if scene.sky.is_some() && is_from_file => Some(end().min(view.far)),
+            _ => None,
+        };
+        if let Some(far) = far {
+            view.far = far.max(options.near.unwrap_or(0.0) * 2.0);
+        }
+        if options.near.is_none() {
+            // What is nearer is found below; this only has to be a valid view.
+            view.near = view.near.min(view.far / 2.0);
+        }
+        let nearest = scene.nearest_depth(&view.camera(options.size).map_err(Error::Planning)?);
+        let least = view.far / MAX_DEPTH_RATIO;
+        let before_all = |nearest: f64| (nearest * BEFORE_THE_NEAREST).max(least);
+        if options.near.is_none() && !is_from_file {
+            let near = match lens {
+                Lens::Perspective { .. } => nearest.map_or(view.far / 1000.0, before_all),
+                // Depths are spread evenly, so nothing is gained by a later beginning.
+                Lens::Orthographic { .. } => 0.0,
+            };
+            // Where the program composed the view, it begins well before the nearest surface.
+            let is_cut = nearest.is_some_and(|nearest| nearest < view.near);
+            if moved || is_cut {
+                view.near = near.min(view.far / 2.0);
+            }
+        }
+        notices.extend(nearest.filter(|&nearest| nearest < view.near).map(|nearest| {
+            format!(
+                "the near plane, {:.3e} metres away, cuts surfaces away that begin at {nearest:.3e}",
+                view.near
+            )
+        }));
     }
     let camera = view.camera(options.size).map_err(Error::Planning)?;
     let numbers = [options.near, options.far, options.fov_deg, options.ortho];
     let changed = numbers.iter().any(Option::is_some) || options.up.is_some();
-    let name = own.map(|c| c.name).filter(|name| {
-        !moved && !changed && scene.is_some_and(|s| s.cameras.iter().any(|c| c.name == *name))
-    });
-    Ok(ChosenView { name, view, camera })
+    let name = own.and_then(|own| own.word).filter(|_| !moved && !changed);
+    Ok(ChosenView { name, view, camera, notices })
 }
 
-fn scene_camera(options: &ViewOptions, scene: &Scene) -> Result<SceneCamera, Error> {
-    let Some(name) = &options.camera else { return Ok(scene.default_view()) };
-    let index = find(Field::Camera, name, scene.cameras.iter().map(|c| c.name.as_str()))?;
-    Ok(scene.cameras[index].clone())
+/// A camera of the scene or, without a word, the view that was composed for it.
+struct OwnCamera {
+    camera: SceneCamera,
+    word: Option<String>,
 }
 
-/// Returns near and far distances for a view from any position. The far distance is where the scene
-/// ends. The near distance is where it begins, but at least a thousandth of the far distance; in
-/// orthographic views it is 0.
-fn depth_range(view: &SceneCamera, size: [u32; 2], bounds: Aabb) -> [f64; 2] {
-    let &SceneCamera { eye, target, lens, .. } = view;
-    let forward = (target - eye).normalize_or(DVec3::NEG_Z);
-    let far = bounds.corners().iter().map(|&c| forward.dot(c - eye)).fold(0.0, f64::max);
-    let far = if far > 0.0 { far * 1.01 } else { 100.0 };
-    let Lens::Perspective { fov_y_rad } = lens else { return [0.0, far] };
-    let distance = eye.distance(eye.clamp(bounds.min, bounds.max));
-    // The scene's nearest point may lie in a corner of the picture, where the depth is less than
-    // the distance.
-    let corner = {
-        let tan_y = (fov_y_rad / 2.0).tan();
-        let tan_x = tan_y * f64::from(size[0]) / f64::from(size[1]);
-        (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt()
+fn own_camera(
+    options: &ViewOptions,
+    scene: &Scene,
+    defaults: &Defaults<'_>,
+) -> Result<OwnCamera, Error> {
+    let choices = scene.camera_choices();
+    let index = match &options.camera {
+        Some(word) => Some(find(Field::Camera, word, &choices)?),
+        None => (!choices.is_empty()).then_some(0),
     };
-    [(distance / corner).max(far / 1000.0), far]
+    Ok(match index {
+        Some(index) => OwnCamera {
+            camera: scene.cameras[index].clone(),
+            word: choices.words(index).into_iter().next(),
+        },
+        None => OwnCamera { camera: defaults.view(scene).clone(), word: None },
+    })
+}
+
+/// The far distance for a view from any position: where the scene ends.
+fn end_of(view: &SceneCamera, bounds: Aabb) -> f64 {
+    let forward = (view.target - view.eye).normalize_or(DVec3::NEG_Z);
+    let far = bounds.corners().iter().map(|&c| forward.dot(c - view.eye)).fold(0.0, f64::max);
+    if far > 0.0 { far * 1.01 } else { 100.0 }
 }

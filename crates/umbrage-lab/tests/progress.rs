@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use umbrage_lab::{
     Backend, Comparison, ComparisonOptions, Executors, Fit, LightOptions, Motion, PreparedScene,
-    Progress, SweepOptions, ViewOptions, open_scene, sweep,
+    Progress, SceneOptions, SweepOptions, ViewOptions, open_scene, sweep,
 };
 
 /// Remembers what it is told.
@@ -47,7 +47,7 @@ fn options() -> ComparisonOptions {
 #[test]
 fn every_row_that_is_announced_is_told() {
     let options = options();
-    let scene = open_scene(Path::new(""), "pole").unwrap();
+    let scene = open_scene(Path::new(""), "pole", &SceneOptions::default()).unwrap();
     let executors = Executors::open(Backend::Reference, &options.techniques).unwrap();
     let prepared = PreparedScene::new(&scene, &executors, false, Fit::Box).unwrap();
     let view = ViewOptions { size: [32, 18], ..ViewOptions::default() };
@@ -79,6 +79,7 @@ fn a_sweep_names_its_parts_and_what_failed() {
         fit: Fit::Box,
         backend: Backend::Reference,
         opaque: false,
+        scene: SceneOptions::default(),
         size: [32, 18],
         command: "a test".to_owned(),
         words: |field| field.to_string(),
@@ -94,7 +95,7 @@ fn a_sweep_names_its_parts_and_what_failed() {
             "2/4 b",
             "b: far: must exceed near (5), is 4",
             "3/4 c",
-            "c: light: the scene has no light `moon`; there are sun",
+            "c: light: the scene has no light `moon`; there are sun or #1",
             "4/4 d",
         ]
     );

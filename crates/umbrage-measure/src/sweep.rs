@@ -35,6 +35,12 @@ pub struct SweepSettings {
     pub light_size: Option<String>,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
+    /// The nodes of the scenes that are left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
+    /// Whether ground is put under the scenes.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ground: bool,
     /// Which receivers the maps are fitted to: those in one `box`, or the `surfaces`.
     pub fit: String,
     /// The executor that renders the shadow maps.
@@ -371,6 +377,8 @@ pub(crate) mod tests {
                 samples: 4,
                 light_size: None,
                 opaque: true,
+                without: Vec::new(),
+                ground: false,
                 fit: "surfaces".to_owned(),
                 backend: "reference".to_owned(),
             },

@@ -76,9 +76,10 @@ impl Instances {
         }
     }
 
-    /// Adds all instances whose box `is_drawn`, with one draw for those of one mesh as long as no
-    /// triangle of theirs is `left_out`. The triangles that are left out of an instance ascend.
-    pub(crate) fn add(
+    /// Adds all instances that cast and whose box `is_drawn`, with one draw for those of one mesh as
+    /// long as no triangle of theirs is `left_out`. The triangles that are left out of an instance
+    /// ascend.
+    pub(crate) fn add_casters(
         &mut self,
         scene: &SceneBuffers<'_>,
         is_drawn: impl Fn(Aabb) -> bool,
@@ -86,7 +87,7 @@ impl Instances {
     ) -> DrawList {
         let first_draw = self.draws.len();
         for (i, instance) in scene.instances.iter().enumerate() {
-            if !is_drawn(instance.bounds) {
+            if !(instance.role.casts && is_drawn(instance.bounds)) {
                 continue;
             }
             let all = scene.meshes[instance.mesh].triangles();
@@ -100,7 +101,7 @@ impl Instances {
         first_draw..self.draws.len()
     }
 
-    /// Adds all instances whose box `is_drawn`, the nearest to `eye` (world space, metres) first:
+    /// Adds all instances that are seen and whose box `is_drawn`, the nearest to `eye` (world space, metres) first:
     /// few fragments are then shaded that others hide. The farthest corner of a box counts, so that
     /// ground and walls follow what stands before them.
     pub(crate) fn add_nearest_first(
@@ -111,7 +112,7 @@ impl Instances {
     ) -> DrawList {
         self.order.clear();
         for (i, instance) in scene.instances.iter().enumerate() {
-            if is_drawn(instance.bounds) {
+            if instance.role.is_seen && is_drawn(instance.bounds) {
                 let Aabb { min, max } = instance.bounds;
                 let squared = (min - eye).abs().max((max - eye).abs()).length_squared() as f32;
                 // Positive numbers are ordered as their bits are.

@@ -3,7 +3,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::{Aabb, Camera};
-use umbrage_scene::{Alpha, Instance, Material, Mesh, Sampling, Scene, Texture, Wrap};
+use umbrage_scene::{Alpha, Instance, Material, Mesh, Role, Sampling, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
@@ -41,6 +41,7 @@ pub(crate) struct Drawable {
     pub(crate) world_from_mesh: DAffine3,
     /// World space, metres.
     pub(crate) bounds: Aabb,
+    pub(crate) role: Role,
 }
 
 /// The range of a mesh in the buffers.
@@ -161,7 +162,8 @@ impl<'a> SceneBuffers<'a> {
         let drawable =
             scene.instances.iter().zip(boxes).enumerate().map(|(i, (placed, bounds))| {
                 let Instance { mesh, world_from_mesh } = *placed;
-                Drawable { instance: i, mesh, world_from_mesh, bounds }
+                let role = scene.roles.of(i);
+                Drawable { instance: i, mesh, world_from_mesh, bounds, role }
             });
         let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
         instances.sort_by_key(|i| i.mesh);

@@ -7,7 +7,10 @@
 mod builtin;
 pub mod daylight;
 mod error;
+mod ground;
 mod load;
+mod nodes;
+mod sky;
 mod texture;
 mod types;
 mod view;
@@ -15,6 +18,7 @@ mod view;
 pub use builtin::{BuiltinInfo, builtin, builtins, closed_form};
 pub use error::SceneError;
 pub use load::{SCENE_BYTES, files, load, load_within};
+pub use nodes::{Choices, LeftOut, Role, Roles, SceneNode};
 pub use types::{
     Alpha, Instance, Lens, Material, Mesh, Notice, Sampling, Scene, SceneCamera, SceneLight,
     Texture, TextureId, Wrap,

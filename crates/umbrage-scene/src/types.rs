@@ -1,3 +1,4 @@
+use crate::nodes::{Role, Roles, SceneNode};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
 
@@ -20,6 +21,13 @@ pub struct Scene {
     pub lights: Vec<SceneLight>,
     /// Notices of what was repaired or left out on loading.
     pub notices: Vec<Notice>,
+    /// The nodes of the file's shown scene, parents before their children; none in built-in scenes.
+    pub nodes: Vec<SceneNode>,
+    /// Which instances are seen, and which cast shadows.
+    pub roles: Roles,
+    /// Index into [`Scene::nodes`] of the node that surrounds all else as a sky does, if there is
+    /// one and it is seen or casts.
+    pub sky: Option<usize>,
 }
 
 /// Triangles of one material, in their own space.
@@ -187,9 +195,21 @@ pub struct SceneLight {
 pub struct Notice(pub String);
 
 impl Scene {
-    /// Number of triangles as drawn: each instance counts the triangles of its mesh.
+    /// Number of triangles as drawn: each instance that is seen or casts counts the triangles of
+    /// its mesh.
     pub fn drawn_triangles(&self) -> u64 {
-        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len() as u64).sum()
+        let drawn = self.instances_that(|role| role.is_seen || role.casts);
+        drawn.map(|i| self.meshes[i.mesh].triangles.len() as u64).sum()
+    }
+
+    /// The instances whose role is as it should be.
+    pub(crate) fn instances_that(
+        &self,
+        is_wanted: impl Fn(Role) -> bool,
+    ) -> impl Iterator<Item = &Instance> {
+        let roles = (0..).map(|i| self.roles.of(i));
+        let wanted = self.instances.iter().zip(roles).filter(move |&(_, role)| is_wanted(role));
+        wanted.map(|(instance, _)| instance)
     }
 
     /// Number of triangles as stored.
@@ -209,13 +229,23 @@ impl Scene {
         self.instances.iter().map(moved).collect()
     }
 
-    /// The box around everything drawn, world space, metres, exact to rounding; [`Aabb::EMPTY`]
-    /// without triangles. Takes a pass over the vertices of every instance that is rotated and may
-    /// extend beyond the instances before it.
+    /// The box around everything that is seen, apart from a [sky](Self::sky), world space, metres,
+    /// exact to rounding; [`Aabb::EMPTY`] without triangles. Takes a pass over the vertices of every
+    /// instance that is rotated and may extend beyond the instances before it.
     pub fn bounds(&self) -> Aabb {
+        self.bounds_of(Role::is_receiver)
+    }
+
+    /// The box around everything that casts shadows, as [`bounds`](Self::bounds) is around what
+    /// receives them.
+    pub fn caster_bounds(&self) -> Aabb {
+        self.bounds_of(|role| role.casts)
+    }
+
+    fn bounds_of(&self, is_wanted: fn(Role) -> bool) -> Aabb {
         let mut all = Aabb::EMPTY;
-        for (i, roomy) in self.instances.iter().zip(self.instance_boxes()) {
-            if all.union(roomy) == all {
+        for ((k, i), roomy) in self.instances.iter().enumerate().zip(self.instance_boxes()) {
+            if !is_wanted(self.roles.of(k)) || all.union(roomy) == all {
                 continue;
             }
             let m = i.world_from_mesh.matrix3;

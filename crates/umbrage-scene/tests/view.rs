@@ -194,3 +194,94 @@ fn scenes_of_nothing_or_of_a_point_get_a_valid_view_and_sun() {
         assert!(light.direction_to_light(DVec3::ZERO).y > 0.0, "{}: {light:?}", scene.name);
     }
 }
+
+/// The nearest depth against the depths of many points on the same triangles.
+#[test]
+fn the_nearest_depth_is_that_of_the_nearest_point_in_view() {
+    let mut random = 1u64;
+    let mut next = move || {
+        random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (random >> 40) as f64 / (1 << 24) as f64
+    };
+    let mut found = 0;
+    for _ in 0..60 {
+        let mut vector = |reach: f64| DVec3::from_array([0.0; 3].map(|_| (next() - 0.5) * reach));
+        let look_at = umbrage::LookAt {
+            eye: vector(4.0),
+            target: vector(4.0),
+            up: DVec3::Y,
+            fov_y_rad: 0.9,
+            near: 0.1,
+            far: 100.0,
+            image: [64, 36],
+        };
+        let camera = Camera::look_at(look_at).unwrap();
+        let mut scene = bare("pole");
+        scene.instances.truncate(1);
+        let positions: Vec<Vec3> = (0..12)
+            .flat_map(|_| {
+                let middle = vector(12.0);
+                [(); 3].map(|()| (middle + vector(3.0)).as_vec3())
+            })
+            .collect();
+        let corner = |i: u32| positions[i as usize].as_dvec3();
+        let triangles: Vec<[u32; 3]> = (0..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let mut expected = f64::INFINITY;
+        const STEPS: u32 = 60;
+        for t in &triangles {
+            let [a, b, c] = t.map(corner);
+            for i in 0..=STEPS {
+                for j in 0..=STEPS - i {
+                    let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(STEPS));
+                    let p = a + (b - a) * u + (c - a) * v;
+                    let in_view = camera.pixel(p).is_some_and(|p| {
+                        (0.0..=64.0).contains(&p.x) && (0.0..=36.0).contains(&p.y)
+                    });
+                    if in_view && camera.depth(p) > 0.0 {
+                        expected = expected.min(camera.depth(p));
+                    }
+                }
+            }
+        }
+        let to_world = DAffine3::from_translation(DVec3::ZERO);
+        scene.instances[0] = Instance { mesh: 0, world_from_mesh: to_world };
+        scene.meshes[0] = Mesh { positions, triangles, ..Mesh::default() };
+        match scene.nearest_depth(&camera) {
+            None => assert_eq!(expected, f64::INFINITY),
+            Some(nearest) => {
+                assert!(nearest <= expected, "{nearest} {expected}");
+                // Points lie within a twentieth of a triangle's edge of any other.
+                let is_close = nearest + 0.3 > expected || expected == f64::INFINITY;
+                assert!(is_close, "{nearest} {expected}");
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 20, "{found}");
+}
+
+/// Of a million boxes each is far smaller than what a view is composed of, and all count together.
+#[test]
+fn crowds_of_small_instances_are_composed_like_the_ground_they_cover() {
+    let mut scene = bare("pole");
+    let cube = scene.instances.iter().min_by_key(|i| scene.meshes[i.mesh].triangles.len());
+    let mesh = cube.unwrap().mesh;
+    let size = scene.meshes[mesh].bounds().size();
+    let side = 700;
+    scene.instances = (0..side * side)
+        .map(|i| {
+            let at = DVec3::new(f64::from(i % side), 0.0, f64::from(i / side));
+            let world_from_mesh = DAffine3::from_scale_rotation_translation(
+                0.5 / size.max(DVec3::splat(1e-9)),
+                glam::DQuat::IDENTITY,
+                at,
+            );
+            Instance { mesh, world_from_mesh }
+        })
+        .collect();
+    let (view, light) = scene.default_view_and_light();
+    assert_eq!(light, scene.light_for_view(&view));
+    let bounds = scene.bounds();
+    assert!(view.eye.clamp(bounds.min, bounds.max).distance(view.eye) < 0.2 * f64::from(side));
+    assert!(view.target.y < view.eye.y, "{view:?}");
+}

@@ -2,7 +2,7 @@ use crate::Error;
 use crate::plane::COMPUTED;
 use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
-use umbrage_scene::Scene;
+use umbrage_scene::{Role, Scene};
 
 /// Largest magnitude that an entry of a transform, or of its inverse, may have. The squares of
 /// larger entries would overflow.
@@ -11,6 +11,7 @@ const LARGEST: f64 = 1e150;
 /// An instance's transform, in the forms that ray tracing needs.
 pub(crate) struct Placement {
     pub(crate) mesh: usize,
+    pub(crate) role: Role,
     pub(crate) world_from_mesh: DAffine3,
     /// Takes directions to mesh space, and also positions relative to the instance's origin.
     pub(crate) mesh_from_world: DMat3,
@@ -37,7 +38,8 @@ impl Placement {
             return wrong("world_from_mesh", "must be finite and invertible");
         }
         let stretch = stretch(world_from_mesh.matrix3);
-        Ok(Self { mesh: instance.mesh, world_from_mesh, mesh_from_world, stretch })
+        let role = scene.roles.of(index);
+        Ok(Self { mesh: instance.mesh, role, world_from_mesh, mesh_from_world, stretch })
     }
 
     pub(crate) fn bounds(&self, mesh_bounds: Aabb) -> Aabb {

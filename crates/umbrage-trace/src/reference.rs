@@ -115,7 +115,7 @@ fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     let range = [-beam.reach_back, f64::INFINITY];
     let hit = match map.apex {
         Some(apex) => tracer.closest_from_lamp(apex + map.origin, ray, range),
-        None => tracer.closest(ray, range),
+        None => tracer.closest_caster(ray, range),
     }?;
     let depth = map.project(tracer.position(&hit)).map_or(1.0, |p| p.z);
     Some(depth.clamp(0.0, 1.0) as f32)

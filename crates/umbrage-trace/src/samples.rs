@@ -137,10 +137,8 @@ impl<'a> View<'a> {
         let size = glam::UVec2::from(self.camera.image()).as_dvec2();
         let is_inside = pixel.cmpge(DVec2::ZERO).all() && pixel.cmple(size).all();
         let is_towards = surface.geometric_normal.dot(to_eye) > 0.0;
-        let is_seen = is_inside
-            && is_towards
-            && end >= 0.0
-            && !self.tracer.occluded_from(surface, to_eye, end);
+        let is_seen =
+            is_inside && is_towards && end >= 0.0 && !self.tracer.hidden_from(surface, to_eye, end);
         is_seen.then(|| Sample { surface: *surface, depth, is_facing: self.is_facing(surface) })
     }
 

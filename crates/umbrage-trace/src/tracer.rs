@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use umbrage::Aabb;
-use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture};
+use umbrage_scene::{Alpha, Material, Mesh, Role, Scene, Texture};
 
 /// One triangle of one instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -106,8 +106,9 @@ impl Eq for Opened {}
 /// neighbours (`ShearedRay`). The boxes are in single precision and are padded for all rounding
 /// (`Boxes`). No hit is ever lost, as long as rays start within some 10⁷ scene sizes of the scene.
 ///
-/// All triangles are visible and cast shadows from both sides. Where an alpha mask removes a
-/// surface, rays pass. Triangles without area are ignored.
+/// All triangles are visible and cast shadows from both sides, unless the scene gives their instance
+/// another [role](Scene::roles). Where an alpha mask removes a surface, rays pass. Triangles without
+/// area are ignored.
 pub struct Tracer<'a> {
     scene: &'a Scene,
     /// One for each mesh.
@@ -115,6 +116,8 @@ pub struct Tracer<'a> {
     /// One for each instance.
     placements: Vec<Placement>,
     instances: Boxes,
+    /// The instances that maps are fitted to; `None` if these are all.
+    receivers: Option<Boxes>,
     bounds: Aabb,
     opaque: bool,
 }
@@ -138,6 +141,17 @@ struct Mask<'a> {
 struct Ends<'a> {
     departure: Option<&'a Surface>,
     lamp: Option<DVec3>,
+}
+
+/// Which instances a ray may meet.
+type Wanted = fn(Role) -> bool;
+const IS_SEEN: Wanted = |role| role.is_seen;
+const CASTS: Wanted = |role| role.casts;
+
+impl Surface {
+    fn ray(&self, direction: DVec3) -> Ray {
+        Ray { origin: self.position, direction }
+    }
 }
 
 impl<'a> Tracer<'a> {
@@ -181,9 +195,16 @@ impl<'a> Tracer<'a> {
         let meshes = meshes.map(|(mesh, slack)| MeshBoxes::build(mesh, slack, scene)).collect();
         let farthest =
             if bounds.is_empty() { DVec3::ZERO } else { bounds.min.abs().max(bounds.max.abs()) };
-        let boxes: Vec<(u32, Aabb)> = (0..).zip(placed).filter(|(_, b)| !b.is_empty()).collect();
-        let instances = Boxes::build(&boxes, farthest.length() * 2f64.powi(-48));
-        Ok(Self { scene, meshes, placements, instances, bounds, opaque: false })
+        let mut boxes: Vec<(u32, Aabb)> =
+            (0..).zip(placed).filter(|(_, b)| !b.is_empty()).collect();
+        let slack = farthest.length() * 2f64.powi(-48);
+        let instances = Boxes::build(&boxes, slack);
+        let receivers = (!scene.roles.are_default()).then(|| {
+            boxes.retain(|&(i, _)| placements[i as usize].role.is_receiver());
+            Boxes::build(&boxes, slack)
+        });
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, (_, b)| all.union(*b));
+        Ok(Self { scene, meshes, placements, instances, receivers, bounds, opaque: false })
     }
 
     /// Sets whether alpha masks are ignored, so that masked materials show and cast as solid.
@@ -197,13 +218,14 @@ impl<'a> Tracer<'a> {
         self.scene
     }
 
-    /// A box around everything drawn, world space, metres; [`Aabb::EMPTY`] if there are no
-    /// triangles. The box is loose around rotated instances; [`Scene::bounds`] gives the exact box.
+    /// A box around everything that is seen, apart from a sky, world space, metres;
+    /// [`Aabb::EMPTY`] if there are no triangles. The box is loose around rotated instances; [`Scene::bounds`] gives the exact box.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// At most `limit` boxes that together hold everything drawn, world space, metres. They leave
+    /// At most `limit` boxes that together hold everything seen, apart from a sky, world space,
+    /// metres. They leave
     /// out much of the empty space that a single box around the scene would hold. Boxes may
     /// overlap. A `limit` of 0 counts as 1, because something must hold what is drawn. Without
     /// triangles there are no boxes.
@@ -213,7 +235,8 @@ impl<'a> Tracer<'a> {
     /// allows.
     pub fn boxes(&self, limit: usize) -> Vec<Aabb> {
         let part = |aabb: Aabb, what| Opened { aabb: aabb.intersection(self.bounds), what };
-        let instances = |node| part(self.instances.aabb(node), What::Instances(node));
+        let tree = self.receivers.as_ref().unwrap_or(&self.instances);
+        let instances = |node| part(tree.aabb(node), What::Instances(node));
         let boxes_of = |instance: u32| {
             let placement = &self.placements[instance as usize];
             (placement, &self.meshes[placement.mesh].boxes)
@@ -229,7 +252,7 @@ impl<'a> Tracer<'a> {
         };
         let open = |what| -> Vec<Opened> {
             match what {
-                What::Instances(node) => match self.instances.open(node) {
+                What::Instances(node) => match tree.open(node) {
                     Ok(nodes) => nodes.map(instances).into(),
                     Err(leaf) => leaf
                         .iter()
@@ -246,8 +269,7 @@ impl<'a> Tracer<'a> {
                 What::Triangle => Vec::new(),
             }
         };
-        let mut opened: BinaryHeap<Opened> =
-            self.instances.root().map(instances).into_iter().collect();
+        let mut opened: BinaryHeap<Opened> = tree.root().map(instances).into_iter().collect();
         let mut closed = Vec::new();
         while let Some(largest) = opened.pop() {
             let parts = open(largest.what);
@@ -262,22 +284,34 @@ impl<'a> Tracer<'a> {
         closed
     }
 
-    /// The first hit with `range[0] ≤ t < range[1]`; either end may be infinite. Of several hits at
-    /// equal t it is the one with the smallest [`PrimitiveRef`]. Rays with coordinates that are not
-    /// finite hit nothing.
+    /// The first hit of what is seen with `range[0] ≤ t < range[1]`; either end may be infinite. Of
+    /// several hits at equal t it is the one with the smallest [`PrimitiveRef`]. Rays with
+    /// coordinates that are not finite hit nothing.
     pub fn closest(&self, ray: Ray, range: [f64; 2]) -> Option<Hit> {
-        self.first(ray, range, None)
+        self.first(ray, range, IS_SEEN, None)
     }
 
-    /// As [`closest`](Self::closest), for a ray of light from a lamp at this world position. Planes
-    /// that hold the lamp are left out, as by [`hidden_from_lamp`](Self::hidden_from_lamp).
+    /// The first hit of what casts shadows, as [`closest`](Self::closest) finds what is seen.
+    pub fn closest_caster(&self, ray: Ray, range: [f64; 2]) -> Option<Hit> {
+        self.first(ray, range, CASTS, None)
+    }
+
+    /// As [`closest_caster`](Self::closest_caster), for a ray of light from a lamp at this world
+    /// position. Planes that hold the lamp are left out, as by
+    /// [`hidden_from_lamp`](Self::hidden_from_lamp).
     pub fn closest_from_lamp(&self, lamp: DVec3, ray: Ray, range: [f64; 2]) -> Option<Hit> {
-        self.first(ray, range, Some(lamp))
+        self.first(ray, range, CASTS, Some(lamp))
     }
 
-    fn first(&self, ray: Ray, range: [f64; 2], lamp: Option<DVec3>) -> Option<Hit> {
+    fn first(
+        &self,
+        ray: Ray,
+        range: [f64; 2],
+        is_wanted: Wanted,
+        lamp: Option<DVec3>,
+    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        self.visit(ray, range, |primitive, hit| {
+        self.visit(ray, range, is_wanted, |primitive, hit| {
             let nearer = best.is_none_or(|b| (hit.t, primitive) < (b.t, b.primitive));
             let is_hit = nearer
                 && hit.t >= range[0]
@@ -292,13 +326,13 @@ impl<'a> Tracer<'a> {
         best
     }
 
-    /// Whether anything is hit with `range[0] ≤ t < range[1]`.
+    /// Whether anything that casts shadows is hit with `range[0] ≤ t < range[1]`.
     pub fn occluded(&self, ray: Ray, range: [f64; 2]) -> bool {
-        self.any(ray, range, Ends::default())
+        self.any(ray, range, Ends::default(), CASTS)
     }
 
-    /// Whether anything lies in `direction` from a point on a surface, nearer than `end` lengths of
-    /// `direction`.
+    /// Whether anything that casts shadows lies in `direction` from a point on a surface, nearer than
+    /// `end` lengths of `direction`.
     ///
     /// The surface does not hide itself, although no epsilon is used: the search skips the point's
     /// own triangle, and every other triangle whose plane the point lies in as far as double
@@ -307,19 +341,26 @@ impl<'a> Tracer<'a> {
     /// corners of both were rounded to single precision, such as decals.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
         let ends = Ends { departure: Some(surface), lamp: None };
-        self.any(Ray { origin: surface.position, direction }, [0.0, end], ends)
+        self.any(surface.ray(direction), [0.0, end], ends, CASTS)
     }
 
-    /// Whether anything lies between a point on a surface and a lamp, which is a point in world
-    /// space.
+    /// As [`occluded_from`](Self::occluded_from), but for what is seen in place of what casts
+    /// shadows.
+    pub(crate) fn hidden_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
+        let ends = Ends { departure: Some(surface), lamp: None };
+        self.any(surface.ray(direction), [0.0, end], ends, IS_SEEN)
+    }
+
+    /// Whether anything that casts shadows lies between a point on a surface and a lamp, which is a
+    /// point in world space.
     ///
     /// The surface does not hide itself, as with [`occluded_from`](Self::occluded_from). A triangle
     /// whose plane holds the lamp is seen edge-on from it and hides nothing either, such as the
     /// ceiling that a downlight is flush with. Whether the plane holds the lamp is decided within
     /// the errors of stored coordinates, so a housing casts however near to the lamp it is.
     pub fn hidden_from_lamp(&self, surface: &Surface, lamp: DVec3) -> bool {
-        let ray = Ray { origin: surface.position, direction: lamp - surface.position };
-        self.any(ray, [0.0, 1.0], Ends { departure: Some(surface), lamp: Some(lamp) })
+        let ends = Ends { departure: Some(surface), lamp: Some(lamp) };
+        self.any(surface.ray(lamp - surface.position), [0.0, 1.0], ends, CASTS)
     }
 
     /// Whether a triangle is seen edge-on from a lamp, because its plane holds the lamp as far as
@@ -404,9 +445,9 @@ impl<'a> Tracer<'a> {
         TrianglePlane::new(placement, self.corners(primitive))
     }
 
-    fn any(&self, ray: Ray, range: [f64; 2], ends: Ends<'_>) -> bool {
+    fn any(&self, ray: Ray, range: [f64; 2], ends: Ends<'_>, is_wanted: Wanted) -> bool {
         let mut found = false;
-        self.visit(ray, range, |primitive, hit| {
+        self.visit(ray, range, is_wanted, |primitive, hit| {
             found = hit.t >= range[0]
                 && hit.t < range[1]
                 && !ends.departure.is_some_and(|from| self.is_left_behind(from, primitive))
@@ -440,12 +481,13 @@ impl<'a> Tracer<'a> {
         mask.factor * alpha * vertex_alpha(mesh, primitive, hit.weights) >= mask.cutoff
     }
 
-    /// Calls `visit` with every triangle that the ray meets, and with some beyond the range.
+    /// Calls `visit` with every triangle of the wanted instances that the ray meets, and with some beyond the range.
     /// `visit` returns the new end of the range, or `None` to stop the search.
     fn visit(
         &self,
         ray: Ray,
         range: [f64; 2],
+        is_wanted: Wanted,
         mut visit: impl FnMut(PrimitiveRef, &TriangleHit) -> Option<f64>,
     ) {
         let is_ray = ray.origin.is_finite()
@@ -458,6 +500,9 @@ impl<'a> Tracer<'a> {
         let mut end = range[1];
         self.instances.visit(ray, range, |instance| {
             let placement = &self.placements[instance as usize];
+            if !is_wanted(placement.role) {
+                return Some(end);
+            }
             let mesh = &self.scene.meshes[placement.mesh];
             let local = Ray {
                 origin: placement.mesh_from_world

@@ -1,7 +1,7 @@
 //! `umbrage compare` and `umbrage sweep`: their options.
 
 use super::technique::ComparisonArgs;
-use super::view::{DEFAULT_SIZE, LightArgs, SceneArgs, ViewArgs};
+use super::view::{DEFAULT_SIZE, LightArgs, SceneArgs, SceneChangeArgs, ViewArgs};
 use crate::values;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -18,8 +18,8 @@ Examples:
 pub(crate) struct Compare {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// Folder for the report; a former report there is replaced.
-    #[arg(short, long, value_name = "DIR")]
+    /// Folder for the report; a former report there is replaced, anything else is not.
+    #[arg(short, long, value_name = "DIR", default_value = "report")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
@@ -47,7 +47,7 @@ pub(crate) struct Compare {
 #[command(after_help = "\
 VIEWS is a JSON list of objects. Each needs `name` and `scene`; what `compare` takes as options may
 follow, with the same defaults: `eye`, `target`, `up` (three numbers), `fov`, `ortho`, `near`, `far`, `size` (two),
-`camera`, `sun` (three) and `light`. For example
+`camera`, `sun` (three), `sun-angles` (two) and `light`. For example
   [{\"name\": \"noon\", \"scene\": \"town\", \"sun\": [0.1, -1, 0.2]},
    {\"name\": \"gate\", \"scene\": \"city/level.glb\", \"eye\": [0, 2, 9], \"target\": [0, 1, 0], \"far\": 80}]
 A sweep that was stopped goes on where it was if the same command is given again. What failed is tried
@@ -62,7 +62,7 @@ pub(crate) struct Sweep {
     #[arg(value_name = "VIEWS")]
     pub(crate) views: PathBuf,
     /// Folder for the results; a sweep that was begun there goes on.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", default_value = "sweep")]
     pub(crate) output: PathBuf,
     /// Folder that the scenes' paths start from; without it, the folder of VIEWS.
     #[arg(long, value_name = "DIR")]
@@ -75,9 +75,8 @@ pub(crate) struct Sweep {
     pub(crate) merge: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) comparison: ComparisonArgs,
-    /// Alpha-masked materials cast and show as solid.
-    #[arg(long)]
-    pub(crate) opaque: bool,
+    #[command(flatten)]
+    pub(crate) changes: SceneChangeArgs,
     /// Size of the pictures, pixels, where a view has none of its own.
     #[arg(
         long, value_name = "WxH", value_parser = values::picture_size, allow_hyphen_values = true,

@@ -5,7 +5,7 @@ use super::view::{LightArgs, SceneArgs, ViewArgs};
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use umbrage::visibility::LightSize;
 use umbrage_lab::NamedTechnique;
 
@@ -14,22 +14,24 @@ use umbrage_lab::NamedTechnique;
 #[command(after_help = "\
 Examples:
   umbrage render town -o town.png --shadows lispsm:pcf3@2048
+  umbrage render town -o town.png --aov color,visibility,truth
   umbrage render model.glb -o error.exr --shadows uniform@512 --aov error \\
       --eye 0,2,5 --target 0,0,0 --sun=-0.5,-1,-0.3")]
 pub(crate) struct Render {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// Picture to write: .png, or .exr for raw floats.
+    /// Picture to write: .png, or .exr for raw floats. Of several --aov, each has its name added:
+    /// town-truth.png. Left out: a new PNG named after the scene.
     #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: PathBuf,
+    output: Option<PathBuf>,
     /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
     #[arg(long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: NamedTechnique,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
-    /// What to write.
-    #[arg(long, value_enum, default_value_t = Aov::Color)]
-    pub(crate) aov: Aov,
+    /// What to write, one picture or more of the same frame.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "color")]
+    aov: Vec<Aov>,
     /// Rays along each side of a pixel: K×K samples.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
@@ -88,21 +90,74 @@ impl Render {
         self.view.options().check()?;
         self.light.options().check()?;
         ensure!(
-            self.light_size.is_none() || self.aov.shows_truth(),
+            self.light_size.is_none() || self.aov.iter().any(|aov| aov.shows_truth()),
             "--light-size: only --aov truth and --aov difference show the truth"
         );
-        self.picture_kind().map(drop)
+        for (i, aov) in self.aov.iter().enumerate() {
+            ensure!(!self.aov[..i].contains(aov), "--aov: `{}` is given twice", aov.word());
+        }
+        self.pictures().map(drop)
     }
 
-    /// Which kind of file to write, by the output's extension.
-    pub(crate) fn picture_kind(&self) -> Result<PictureKind> {
-        let extension = self.output.extension().map(|e| e.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("png") => Ok(PictureKind::Png),
-            Some("exr") => Ok(PictureKind::Exr),
-            _ => bail!("--output: {} must end in .png or .exr", self.output.display()),
-        }
+    /// The pictures to write, each with a file of its own.
+    pub(crate) fn pictures(&self) -> Result<Vec<PictureArgs>> {
+        let Some(output) = &self.output else { return Ok(self.new_pictures()) };
+        let extension = output.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let kind = match extension.as_deref() {
+            Some("png") => PictureKind::Png,
+            Some("exr") => PictureKind::Exr,
+            _ => bail!("--output: {} must end in .png or .exr", output.display()),
+        };
+        let path = |aov: Aov| match self.aov.len() {
+            1 => output.clone(),
+            _ => {
+                let mut name = output.file_stem().unwrap_or_default().to_owned();
+                name.push(format!("-{}.", aov.word()));
+                name.push(output.extension().unwrap_or_default());
+                output.with_file_name(name)
+            }
+        };
+        Ok(self.aov.iter().map(|&aov| PictureArgs { aov, kind, path: path(aov) }).collect())
     }
+
+    /// PNGs that are named after the scene, none of which is there yet.
+    fn new_pictures(&self) -> Vec<PictureArgs> {
+        let name = self.scene.name.split(':').next().unwrap_or_default();
+        let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let numbered = (1..).map(|n| match n {
+            1 => stem.clone(),
+            n => format!("{stem}-{n}"),
+        });
+        let named = numbered.map(|stem| {
+            let path = |aov: Aov| match self.aov[..] {
+                [Aov::Color] => PathBuf::from(format!("{stem}.png")),
+                _ => PathBuf::from(format!("{stem}-{}.png", aov.word())),
+            };
+            let pictures = self.aov.iter();
+            pictures
+                .map(|&aov| PictureArgs { aov, kind: PictureKind::Png, path: path(aov) })
+                .collect::<Vec<_>>()
+        });
+        let is_new = |pictures: &Vec<PictureArgs>| {
+            pictures.iter().all(|p| p.path.symlink_metadata().is_err())
+        };
+        named.into_iter().find(is_new).unwrap_or_default()
+    }
+}
+
+impl Aov {
+    /// The word for it on the command line.
+    fn word(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
+    }
+}
+
+/// A picture to write.
+#[derive(Clone, Debug)]
+pub(crate) struct PictureArgs {
+    pub(crate) aov: Aov,
+    pub(crate) kind: PictureKind,
+    pub(crate) path: PathBuf,
 }
 
 /// A kind of picture file.

@@ -1,7 +1,7 @@
 //! `umbrage plan`: its options.
 
 use super::technique::{Fit, TexelArgs};
-use super::view::{LightsArgs, ViewArgs};
+use super::view::{LightsArgs, SceneChangeArgs, ViewArgs};
 use anyhow::{Result, ensure};
 use clap::Args;
 use umbrage_lab::NamedTechnique;
@@ -19,12 +19,15 @@ pub(crate) struct Plan {
     /// whole view between --near and --far is served.
     #[arg(value_name = "SCENE")]
     pub(crate) scene: Option<String>,
+    #[command(flatten)]
+    pub(crate) changes: SceneChangeArgs,
     /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
     #[arg(long, value_name = "SPEC", default_value = "adaptive")]
     pub(crate) shadows: NamedTechnique,
     #[command(flatten)]
     pub(crate) texels: TexelArgs,
-    /// What the maps are fitted to, and their errors the largest over.
+    /// What the maps are fitted to, and their errors the largest over. Other commands take surfaces
+    /// by default; an engine may know no more than a box.
     #[arg(long, value_enum, default_value_t = Fit::Box)]
     pub(crate) fit: Fit,
     /// Print JSON instead of a table.
@@ -58,6 +61,12 @@ impl Plan {
             [("--camera", view.camera.is_some()), ("--light", self.lights.names_any())]
         {
             ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
+        }
+        let SceneChangeArgs { opaque, without, ground } = &self.changes;
+        let changes =
+            [("--opaque", *opaque), ("--without", !without.is_empty()), ("--ground", *ground)];
+        for (option, is_given) in changes {
+            ensure!(!is_given, "{option} changes a scene, but no SCENE is given");
         }
         ensure!(self.fit == Fit::Box, "--fit: `surfaces` and `seen` need a SCENE, which has them");
         Ok(())

@@ -4,7 +4,7 @@ use crate::values;
 use anyhow::{Result, ensure};
 use clap::Args;
 use glam::DVec3;
-use umbrage_lab::{LightOptions, ViewOptions};
+use umbrage_lab::{LightOptions, SceneOptions, ViewOptions};
 
 /// Size of pictures where none is given.
 pub(super) const DEFAULT_SIZE: &str = "960x540";
@@ -16,9 +16,30 @@ pub(crate) struct SceneArgs {
     /// like: town:200.
     #[arg(value_name = "SCENE")]
     pub(crate) name: String,
+    #[command(flatten)]
+    pub(crate) changes: SceneChangeArgs,
+}
+
+/// How scenes are changed.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SceneChangeArgs {
     /// Alpha-masked materials cast and show as solid.
     #[arg(long)]
     pub(crate) opaque: bool,
+    /// Leave nodes out, with all below them, by name or number (`umbrage info` lists them); once for
+    /// each. NAME:casting casts no shadow but is seen, NAME:receiving casts but is not seen.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) without: Vec<String>,
+    /// Put ground under the scene, such as a single model.
+    #[arg(long)]
+    pub(crate) ground: bool,
+}
+
+impl SceneChangeArgs {
+    /// How the scene is changed when it is opened.
+    pub(crate) fn options(&self) -> SceneOptions {
+        SceneOptions { without: self.without.clone(), ground: self.ground }
+    }
 }
 
 /// The view. What is left out comes from the scene.
@@ -55,7 +76,7 @@ pub(crate) struct ViewArgs {
         default_value = DEFAULT_SIZE
     )]
     pub(crate) size: [u32; 2],
-    /// A camera of the scene, by name.
+    /// A camera of the scene, by the name of its node, its own name or its number, such as #2.
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
 }
@@ -66,10 +87,17 @@ pub(crate) struct ViewArgs {
 pub(crate) struct LightArgs {
     /// Parallel light: the way it travels.
     #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
-    pub(crate) sun: Option<DVec3>,
-    /// A light of the scene, by name.
+    sun: Option<DVec3>,
+    /// Parallel light from where the sun stands, degrees: azimuth, clockwise from north (-z; east
+    /// is +x), and elevation above the horizon.
+    #[arg(
+        long, value_name = "AZIMUTH,ELEVATION", value_parser = values::sun_angles,
+        allow_hyphen_values = true, conflicts_with_all = ["sun", "light"]
+    )]
+    sun_angles: Option<DVec3>,
+    /// A light of the scene, by the name of its node, its own name or its number, such as #2.
     #[arg(long, value_name = "NAME")]
-    pub(crate) light: Option<String>,
+    light: Option<String>,
 }
 
 /// What shines, one light or more. Left out: as for one.
@@ -79,7 +107,15 @@ pub(crate) struct LightsArgs {
     /// Parallel light: the way it travels.
     #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
     sun: Option<DVec3>,
-    /// A light of the scene, by name; once for each.
+    /// Parallel light from where the sun stands, degrees: azimuth, clockwise from north (-z; east
+    /// is +x), and elevation above the horizon.
+    #[arg(
+        long, value_name = "AZIMUTH,ELEVATION", value_parser = values::sun_angles,
+        allow_hyphen_values = true, conflicts_with_all = ["sun", "light"]
+    )]
+    sun_angles: Option<DVec3>,
+    /// A light of the scene, by the name of its node, its own name or its number, such as #2; once
+    /// for each.
     #[arg(long, value_name = "NAME")]
     light: Vec<String>,
 }
@@ -105,7 +141,7 @@ impl ViewArgs {
 impl LightArgs {
     /// The light that is asked for.
     pub(crate) fn options(&self) -> LightOptions {
-        LightOptions { sun: self.sun, light: self.light.clone() }
+        LightOptions { sun: self.sun.or(self.sun_angles), light: self.light.clone() }
     }
 }
 
@@ -117,7 +153,7 @@ impl LightsArgs {
 
     /// Each light for itself; one that says nothing if none was named.
     pub(crate) fn each(&self) -> Vec<LightOptions> {
-        let one = |light| LightOptions { sun: self.sun, light };
+        let one = |light| LightOptions { sun: self.sun.or(self.sun_angles), light };
         if self.light.is_empty() {
             vec![one(None)]
         } else {

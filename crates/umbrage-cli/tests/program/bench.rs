@@ -116,7 +116,7 @@ fn without_a_gpu_there_is_the_reference() {
     let auto = run("auto");
     assert!(auto.status.success());
     let told = String::from_utf8(auto.stderr).unwrap();
-    assert!(told.starts_with("backend: reference, on the CPU (no GPU answers"), "{told}");
+    assert!(told.contains("\nbackend: reference, on the CPU (no GPU answers"), "{told}");
     std::fs::remove_file(desk.path("p.png")).unwrap();
     let gpu = run("gpu");
     assert_eq!(gpu.status.code(), Some(1));

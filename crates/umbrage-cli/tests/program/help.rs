@@ -9,6 +9,8 @@ fn every_command_has_help_with_an_example() {
         &["compare"],
         &["sweep"],
         &["plan"],
+        &["info"],
+        &["completions"],
         &["scenes"],
         &["theory"],
         &["bench"],
@@ -63,7 +65,9 @@ fn the_version_is_the_packages() {
 fn examples_of_the_help_parse() {
     // What needs no file of the user's must run as printed; the rest must be understood up to that.
     let desk = Desk::new();
-    for command in ["render", "compare", "sweep", "plan", "scenes", "theory", "bench", "devices"] {
+    for command in
+        ["render", "compare", "sweep", "plan", "info", "scenes", "theory", "bench", "devices"]
+    {
         let help = desk.succeed(&[command, "--help"]);
         let examples = help.split("Examples:").nth(1).unwrap().replace("\\\n", " ");
         for example in examples.lines().map(str::trim).filter(|l| l.starts_with("umbrage")) {

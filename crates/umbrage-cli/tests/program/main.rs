@@ -13,6 +13,7 @@ mod none;
 mod partitions;
 mod plan;
 mod render;
+mod scene_options;
 mod scenes;
 mod sweep;
 mod theory;

@@ -7,7 +7,7 @@ use umbrage_testing::needs;
 fn its_plan_has_no_maps() {
     let desk = Desk::new();
     let run = desk.run(&["plan", "pole", "--shadows", "none", "--json"]);
-    assert_eq!((run.code, run.stderr.as_str()), (0, ""));
+    assert_eq!(run.code, 0, "{}", run.stderr);
     let plan: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
     assert!(plan["maps"].as_array().unwrap().is_empty());
     assert_eq!((&plan["texels"], &plan["lights"][0]["maps"]), (&0.into(), &[0, 0].into()));

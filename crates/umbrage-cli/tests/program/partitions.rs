@@ -309,7 +309,7 @@ fn lights_share_a_plan() {
     for (light, (name, range)) in
         lights.iter().zip([("torch", [0, 2]), ("noon", [2, 4]), ("bulb", [4, 16])])
     {
-        assert_eq!(keys(light), ["maps", "name", "theta_deg"]);
+        assert_eq!(keys(light), ["light", "maps", "name", "theta_deg"]);
         assert_eq!((&light["name"], &light["maps"]), (&json!(name), &json!(range)));
         // Alone, a light has the same angle.
         assert_eq!(light["theta_deg"], stage(&format!("--light {name}"))["theta_deg"]);

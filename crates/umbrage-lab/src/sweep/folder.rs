@@ -209,6 +209,7 @@ pub(super) fn check_same(
     present: &SweepSettings,
     wanted: &SweepSettings,
 ) -> Result<(), Error> {
+    let on = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
     let values = |s: &SweepSettings| {
         [
             (Field::Shadows, s.shadows.join(" ")),
@@ -217,7 +218,9 @@ pub(super) fn check_same(
             (Field::Samples, s.samples.to_string()),
             (Field::LightSize, s.light_size.clone().unwrap_or_else(|| "off".to_owned())),
             (Field::Fit, s.fit.clone()),
-            (Field::Opaque, if s.opaque { "on" } else { "off" }.to_owned()),
+            (Field::Opaque, on(s.opaque)),
+            (Field::Without, s.without.join(" ")),
+            (Field::Ground, on(s.ground)),
             (Field::Backend, s.backend.clone()),
         ]
     };

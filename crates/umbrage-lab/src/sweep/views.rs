@@ -2,6 +2,7 @@
 
 use crate::error::{About, Error, Field};
 use crate::light::LightOptions;
+use crate::values;
 use crate::view::ViewOptions;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,8 @@ pub(super) struct SweepView {
     size: Option<[u32; 2]>,
     camera: Option<String>,
     sun: Option<[f64; 3]>,
+    #[serde(default, rename = "sun-angles", skip_serializing_if = "Option::is_none")]
+    sun_angles: Option<[f64; 2]>,
     light: Option<String>,
 }
 
@@ -97,7 +100,17 @@ impl SweepView {
             size: self.size.unwrap_or(size),
             camera: self.camera.clone(),
         };
-        let light = LightOptions { sun: self.sun.map(DVec3::from), light: self.light.clone() };
+        let sun = match (self.sun, self.sun_angles) {
+            (Some(_), Some(_)) => {
+                return Err(Error::Excluded { field: Field::SunAngles, by: Field::Sun });
+            }
+            (sun, None) => sun.map(DVec3::from),
+            (None, Some(angles)) => Some(
+                values::sun_direction(angles)
+                    .map_err(|problem| Error::field(Field::SunAngles, problem))?,
+            ),
+        };
+        let light = LightOptions { sun, light: self.light.clone() };
         view.check()?;
         light.check()?;
         Ok((view, light))

@@ -386,6 +386,8 @@ fn a_sweeps_page_leads_to_its_views() {
             light_size: None,
             fit: "box".to_owned(),
             opaque: true,
+            without: vec![nasty.to_owned()],
+            ground: true,
             backend: "reference".to_owned(),
         },
         views: vec![

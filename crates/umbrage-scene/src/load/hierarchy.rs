@@ -20,6 +20,8 @@ pub(super) struct Hierarchy {
     pub(super) is_hidden: Vec<bool>,
     /// Indices of the nodes in the shown scene, each once, with parents before their children.
     pub(super) shown: Vec<usize>,
+    /// The parent of each node, indexed by node.
+    pub(super) parent: Vec<Option<usize>>,
 }
 
 impl Hierarchy {
@@ -86,7 +88,7 @@ impl Hierarchy {
                 open[first..].reverse();
             }
         }
-        Ok(Self { world_from_node, is_hidden, shown })
+        Ok(Self { world_from_node, is_hidden, shown, parent })
     }
 }
 

@@ -13,11 +13,15 @@ mod skin;
 mod uri;
 
 use crate::error::SceneError;
+use crate::nodes::SceneNode;
+use crate::sky;
 use crate::types::{Alpha, Instance, Scene};
 use budget::Budget;
 use document::{Document, Notices};
 use glam::{DAffine3, DMat3};
 use gltf::json::Index;
+use gltf::json::extensions::scene::khr_lights_punctual::Type;
+use gltf::json::validation::Checked;
 use hierarchy::{Hierarchy, LARGEST};
 use instancing::Copies;
 use material::Materials;
@@ -97,12 +101,16 @@ pub fn load_within(path: &Path, limit: u64) -> Result<Scene, SceneError> {
         },
         notices,
     };
-    for &node in &hierarchy.shown {
-        loader.load_mesh(node)?;
+    let mut place_of = vec![None; document.root.nodes.len()];
+    for (place, &node) in hierarchy.shown.iter().enumerate() {
+        place_of[node] = Some(place);
+        loader.load_node(node, hierarchy.parent[node].and_then(|parent| place_of[parent]))?;
     }
-    let bounds = loader.check_drawn()?;
-    for &node in &hierarchy.shown {
-        loader.load_camera_and_light(node, bounds)?;
+    loader.check_drawn()?;
+    sky::find(&mut loader.scene, has_lamps(&document, &hierarchy));
+    let bounds = loader.scene.bounds();
+    for (place, &node) in hierarchy.shown.iter().enumerate() {
+        loader.load_camera_and_light(place, node, bounds)?;
     }
     Ok(loader.finish())
 }
@@ -143,7 +151,31 @@ struct Loader<'a> {
     notices: Notices,
 }
 
+/// Whether a shown node holds a spot or point light.
+fn has_lamps(document: &Document, hierarchy: &Hierarchy) -> bool {
+    let lights = document.root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+    let is_lamp = |node: usize| {
+        let held = document.root.nodes[node].extensions.as_ref()?.khr_lights_punctual.as_ref()?;
+        let light = lights?.lights.get(held.light.value())?;
+        Some(!matches!(light.type_, Checked::Valid(Type::Directional)))
+    };
+    hierarchy.shown.iter().any(|&node| !hierarchy.is_hidden[node] && is_lamp(node) == Some(true))
+}
+
 impl Loader<'_> {
+    /// Loads a node's mesh, and notes the node. `parent` is the place of its parent among the nodes.
+    fn load_node(&mut self, index: usize, parent: Option<usize>) -> Result<(), SceneError> {
+        let begin = self.scene.instances.len();
+        self.load_mesh(index)?;
+        self.scene.nodes.push(SceneNode {
+            name: self.document.root.nodes[index].name.clone().unwrap_or_default(),
+            parent,
+            instances: begin..self.scene.instances.len(),
+            ..SceneNode::default()
+        });
+        Ok(())
+    }
+
     fn load_mesh(&mut self, index: usize) -> Result<(), SceneError> {
         let (document, hierarchy) = (self.document, self.hierarchy);
         let node = &document.root.nodes[index];
@@ -249,11 +281,11 @@ impl Loader<'_> {
         Ok(made)
     }
 
-    /// The box around the scene.
+    /// Checks what is drawn.
     ///
     /// # Errors
     /// The scene draws nothing, or extends beyond [`WORLD_END`].
-    fn check_drawn(&self) -> Result<Aabb, SceneError> {
+    fn check_drawn(&self) -> Result<(), SceneError> {
         let bounds = self.scene.bounds();
         if self.scene.drawn_triangles() == 0 {
             return Err(self.document.invalid("scene", "there are no triangles to draw"));
@@ -263,10 +295,17 @@ impl Loader<'_> {
             let problem = format!("reaches {reach:e} m from the origin, the world ends at 1e12 m");
             return Err(self.document.invalid("scene", problem));
         }
-        Ok(bounds)
+        Ok(())
     }
 
-    fn load_camera_and_light(&mut self, index: usize, bounds: Aabb) -> Result<(), SceneError> {
+    /// Loads the camera and the light of the node with this index, whose place among the scene's
+    /// nodes is `place`.
+    fn load_camera_and_light(
+        &mut self,
+        place: usize,
+        index: usize,
+        bounds: Aabb,
+    ) -> Result<(), SceneError> {
         let node = &self.document.root.nodes[index];
         let world = &self.hierarchy.world_from_node[index];
         let name = node.name.as_deref();
@@ -280,6 +319,7 @@ impl Loader<'_> {
                 bounds,
                 notices,
             )?;
+            self.scene.nodes[place].camera = camera.is_some().then_some(self.scene.cameras.len());
             self.scene.cameras.extend(camera);
         }
         let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
@@ -287,6 +327,7 @@ impl Loader<'_> {
             let (index, notices) = (light.light.value(), &mut self.notices);
             let light =
                 cameras_and_lights::load_light(self.document, index, name, world, bounds, notices)?;
+            self.scene.nodes[place].light = light.is_some().then_some(self.scene.lights.len());
             self.scene.lights.extend(light);
         }
         Ok(())

@@ -100,7 +100,7 @@ mod tests {
         let Light::Point(flame) = scene.lights[0].light else { panic!("{:?}", scene.lights) };
         let score = |range: f64| {
             let lamp = Light::Point(PointLight { range, ..flame });
-            lighting(&grid, Some(lamp), view.eye, view.target, view.fov_y_rad).score
+            lighting(&grid, Some(lamp), view.eye, view.target, view.lens).score
         };
         // A light whose range reaches no surface leaves everything dark, without any edge of a
         // shadow.

@@ -1,13 +1,17 @@
+use crate::nodes::Role;
 use crate::types::{Mesh, Scene};
-use glam::{DVec3, IVec3, USizeVec3, Vec3};
+use glam::{DAffine3, DVec3, IVec3, USizeVec3, Vec3};
 use umbrage::Aabb;
 
 /// Number of cells along the longest edge of the scene's box.
 const CELLS: f64 = 160.0;
 /// Least number of cells along the other edges, so that flat scenes keep their relief.
 const MIN_CELLS: f64 = 24.0;
-/// Largest number of triangles that are entered. Of larger scenes, only every n-th triangle is.
+/// Number of triangles to enter. Of larger scenes, only every n-th triangle of fine meshes is, and
+/// instances no wider than a cell fill their boxes.
 const MAX_TRIANGLES: u64 = 4_000_000;
+/// Number of triangles from which a mesh counts as fine.
+const FINE: usize = 1000;
 
 /// Directions that the surfaces in a cell face, one bit each: −x, −y, −z, +x, +y, +z.
 pub(super) type Facing = u8;
@@ -24,6 +28,37 @@ pub(super) struct Occupancy {
     cells: Vec<Facing>,
     /// Lowest occupied layer of each column; `None` for an empty column.
     floor: Vec<Option<usize>>,
+}
+
+/// An instance of a mesh.
+#[derive(Clone, Copy)]
+struct Placed<'a> {
+    mesh: &'a Mesh,
+    world_from_mesh: DAffine3,
+    double_sided: bool,
+}
+
+impl Placed<'_> {
+    /// The corners of a triangle in world space.
+    fn corners(self, triangle: &[u32; 3]) -> [DVec3; 3] {
+        let corner = |i: u32| self.mesh.positions[i as usize].as_dvec3();
+        triangle.map(|i| self.world_from_mesh.transform_point3(corner(i)))
+    }
+
+    fn facing_of(self, [a, b, c]: [DVec3; 3]) -> Facing {
+        let mirrored = self.world_from_mesh.matrix3.determinant() < 0.0;
+        let normal = (b - a).cross(c - a) * if mirrored { -1.0 } else { 1.0 };
+        let back = if self.double_sided { faced(-normal) } else { 0 };
+        faced(normal) | back
+    }
+
+    /// Where every `step`-th triangle from the one at `begin` on faces, or at least one.
+    fn facing(self, begin: usize, step: usize) -> Facing {
+        let triangles = &self.mesh.triangles;
+        let begin = begin.min(triangles.len() - 1);
+        let some = triangles[begin..].iter().step_by(step);
+        some.fold(0, |all, t| all | self.facing_of(self.corners(t)))
+    }
 }
 
 /// The cell where a ray ends.
@@ -51,12 +86,28 @@ impl Occupancy {
             cells: vec![0; size.x * size.y * size.z],
             floor: vec![None; size.x * size.z],
         };
-        let drawn = scene.drawn_triangles();
-        for instance in &scene.instances {
+        let step = scene.drawn_triangles().div_ceil(MAX_TRIANGLES).max(1) as usize;
+        let boxes: Vec<Aabb> = scene.meshes.iter().map(Mesh::bounds).collect();
+        let mut begin = 0;
+        for instance in scene.instances_that(Role::is_receiver) {
             let mesh = &scene.meshes[instance.mesh];
             let double_sided = scene.materials.get(mesh.material).is_some_and(|m| m.double_sided);
-            let step = if mesh.triangles.len() < 1000 { 1 } else { drawn.div_ceil(MAX_TRIANGLES) };
-            grid.add(mesh, instance.world_from_mesh, double_sided, step as usize);
+            let placed = Placed { mesh, world_from_mesh: instance.world_from_mesh, double_sided };
+            let count = mesh.triangles.len();
+            if step == 1 || count == 0 {
+                grid.add(placed, 1);
+                continue;
+            }
+            let to_grid = |p| (instance.world_from_mesh.transform_point3(p) - bounds.min) / cell;
+            let cells = Aabb::around(boxes[instance.mesh].corners().map(to_grid));
+            let [width, _, depth] = cells.size().to_array();
+            if width.max(depth) <= 1.0 {
+                // Which triangles are entered goes around, because neighbours share cells.
+                grid.fill_box(cells, placed.facing(begin, step));
+                begin = (begin + step - count % step) % step;
+            } else {
+                grid.add(placed, if count < FINE { 1 } else { step });
+            }
         }
         for z in 0..size.z {
             for x in 0..size.x {
@@ -67,25 +118,27 @@ impl Occupancy {
         grid
     }
 
-    fn add(
-        &mut self,
-        mesh: &Mesh,
-        world_from_mesh: glam::DAffine3,
-        double_sided: bool,
-        step: usize,
-    ) {
-        let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
-        for t in mesh.triangles.iter().step_by(step) {
-            let [a, b, c] = t.map(|i| {
-                let p = world_from_mesh.transform_point3(mesh.positions[i as usize].as_dvec3());
-                (p, ((p - self.bounds.min) / self.cell).as_vec3())
-            });
-            let normal = (b.0 - a.0).cross(c.0 - a.0) * if mirrored { -1.0 } else { 1.0 };
-            let mut facing = faced(normal);
-            if double_sided {
-                facing |= faced(-normal);
+    /// Enters every `step`-th triangle of an instance.
+    fn add(&mut self, placed: Placed<'_>, step: usize) {
+        for t in placed.mesh.triangles.iter().step_by(step) {
+            let corners = placed.corners(t);
+            let in_cells = |p: DVec3| ((p - self.bounds.min) / self.cell).as_vec3();
+            self.fill(corners.map(in_cells), placed.facing_of(corners));
+        }
+    }
+
+    /// Marks the cells of a box, which is in units of cells.
+    fn fill_box(&mut self, cells: Aabb, facing: Facing) {
+        let last = self.size - USizeVec3::ONE;
+        let [from, to] =
+            [cells.min, cells.max].map(|p| p.max(DVec3::ZERO).as_usizevec3().min(last));
+        for z in from.z..=to.z {
+            for y in from.y..=to.y {
+                for x in from.x..=to.x {
+                    let k = self.index(x, y, z);
+                    self.cells[k] |= facing;
+                }
             }
-            self.fill([a.1, b.1, c.1], facing);
         }
     }
 
