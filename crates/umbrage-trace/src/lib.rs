@@ -49,6 +49,7 @@
 mod boxes;
 mod check;
 mod error;
+mod filled;
 mod placement;
 mod reference;
 mod samples;
@@ -58,6 +59,7 @@ mod tracer;
 mod triangle;
 
 pub use error::Error;
+pub use filled::PixelMemory;
 pub use reference::{DepthMap, MapTexel, Reference};
 pub use samples::{Band, Sample, View};
 pub use tracer::{Hit, PrimitiveRef, Surface, Tracer};
@@ -73,6 +75,13 @@ pub struct Ray {
     /// Direction in world space, of any length but zero. The parameter t counts lengths of
     /// `direction`.
     pub direction: DVec3,
+}
+
+impl Ray {
+    /// The point at a parameter, world space.
+    pub(crate) fn at(self, t: f64) -> DVec3 {
+        self.origin + t * self.direction
+    }
 }
 
 /// A callback that is told how many more rows are done. Any thread may call it.

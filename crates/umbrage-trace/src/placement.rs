@@ -1,4 +1,4 @@
-use crate::Error;
+use crate::{Error, Ray};
 use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
 use umbrage_scene::Scene;
@@ -37,6 +37,14 @@ impl Placement {
         }
         let stretch = stretch(world_from_mesh.matrix3);
         Ok(Self { mesh: instance.mesh, world_from_mesh, mesh_from_world, stretch })
+    }
+
+    /// A ray of world space in mesh space, with the same parameter along it.
+    pub(crate) fn ray_in_mesh(&self, ray: Ray) -> Ray {
+        Ray {
+            origin: self.mesh_from_world * (ray.origin - self.world_from_mesh.translation),
+            direction: self.mesh_from_world * ray.direction,
+        }
     }
 
     pub(crate) fn bounds(&self, mesh_bounds: Aabb) -> Aabb {

@@ -1,4 +1,4 @@
-use crate::{Error, Progress, Ray, Surface, Tracer};
+use crate::{Error, Hit, Progress, Ray, Surface, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -104,22 +104,36 @@ impl<'a> View<'a> {
 
     fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Option<Sample>> {
         let grid = self.grid;
-        (0..grid * grid).map(move |i| {
-            let within = DVec2::new(f64::from(i % grid) + 0.5, f64::from(i / grid) + 0.5);
-            self.sample(DVec2::new(f64::from(x), f64::from(y)) + within / f64::from(grid))
-        })
+        (0..grid * grid).map(move |i| self.sample(self.point(x, y, i)))
+    }
+
+    /// The point of the picture, in pixels, at which the sample of this index in a pixel is taken.
+    pub(crate) fn point(&self, x: u32, y: u32, index: u32) -> DVec2 {
+        let grid = self.grid;
+        let within = DVec2::new(f64::from(index % grid) + 0.5, f64::from(index / grid) + 0.5);
+        DVec2::new(f64::from(x), f64::from(y)) + within / f64::from(grid)
     }
 
     /// The surface seen at a point of the picture, given in pixels as for [`Camera::ray`]; `None`
     /// where the sky shows. Surfaces nearer than the camera's near distance are not seen. Surfaces
     /// beyond its far distance are seen, but no shadow map serves them.
     pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
-        let ray = Ray { origin: self.camera.eye(), direction: self.camera.ray(pixel) };
+        let ray = self.ray(pixel);
         let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
-        let surface = self.tracer.surface(&hit, ray.direction);
+        Some(self.sample_at(&hit, ray))
+    }
+
+    /// The ray through a point of the picture. Its direction has depth 1.
+    pub(crate) fn ray(&self, pixel: DVec2) -> Ray {
+        Ray { origin: self.camera.eye(), direction: self.camera.ray(pixel) }
+    }
+
+    /// The sample where a ray of the picture hits.
+    pub(crate) fn sample_at(&self, hit: &Hit, ray: Ray) -> Sample {
+        let surface = self.tracer.surface(hit, ray.direction);
         let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
         // The ray's direction has depth 1, so its parameter t is the depth.
-        Some(Sample { surface, depth: hit.t, is_facing })
+        Sample { surface, depth: hit.t, is_facing }
     }
 
     /// The sample that this view has at a point which another view saw. `None` if the point lies
@@ -158,6 +172,18 @@ impl<'a> View<'a> {
     /// included. Samples nearer to the light than its `near` distance are never in shadow, as
     /// documented at [`SpotLight`] and [`PointLight`].
     pub fn truth(&self, sample: &Sample) -> f32 {
+        self.truth_by(sample, |surface, direction, end| {
+            self.tracer.occluded_from(surface, direction, end)
+        })
+    }
+
+    /// [`truth`](Self::truth), where `is_occluded` says whether anything lies in a direction from a
+    /// surface, nearer than this many lengths of the direction.
+    pub(crate) fn truth_by(
+        &self,
+        sample: &Sample,
+        is_occluded: impl FnOnce(&Surface, DVec3, f64) -> bool,
+    ) -> f32 {
         if !sample.is_facing {
             return 0.0;
         }
@@ -169,8 +195,7 @@ impl<'a> View<'a> {
             Light::Point(point) if cube_depth(&point, position) < point.near => return 1.0,
             Light::Point(point) => (point.position - position, 1.0),
         };
-        let is_dark = self.tracer.occluded_from(&sample.surface, direction, end);
-        f32::from(u8::from(!is_dark))
+        f32::from(u8::from(!is_occluded(&sample.surface, direction, end)))
     }
 }
 

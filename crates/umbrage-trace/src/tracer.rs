@@ -1,3 +1,5 @@
+mod beam;
+
 use crate::boxes::{Boxes, Node};
 use crate::check::check_mesh;
 use crate::placement::{Placement, stretch};
@@ -9,6 +11,8 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture};
+
+pub(crate) use beam::{Beam, End};
 
 /// One triangle of one instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -135,6 +139,12 @@ struct Mask<'a> {
 struct Departure {
     from: PrimitiveRef,
     position_error: f64,
+}
+
+impl Departure {
+    fn of(surface: &Surface) -> Self {
+        Self { from: surface.primitive, position_error: surface.position_error }
+    }
 }
 
 impl<'a> Tracer<'a> {
@@ -289,9 +299,8 @@ impl<'a> Tracer<'a> {
     /// [`position_error`](Surface::position_error): 2⁻²³ of the corners' coordinates, by which
     /// storing corners in single precision moves a surface, plus some 2⁻⁴⁹ of the world position.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
-        let departure =
-            Departure { from: surface.primitive, position_error: surface.position_error };
-        self.any(Ray { origin: surface.position, direction }, [0.0, end], Some(departure))
+        let ray = Ray { origin: surface.position, direction };
+        self.any(ray, [0.0, end], Some(Departure::of(surface)))
     }
 
     /// World position of a hit, metres, computed from the triangle's corners, not along the ray.
@@ -349,13 +358,25 @@ impl<'a> Tracer<'a> {
     fn any(&self, ray: Ray, range: [f64; 2], departure: Option<Departure>) -> bool {
         let mut found = false;
         self.visit(ray, range, |primitive, hit| {
-            found = hit.t >= range[0]
-                && hit.t < range[1]
-                && departure.is_none_or(|d| !self.is_left_behind(d, ray.origin, primitive))
-                && self.is_there(primitive, hit);
+            found = self.hides(primitive, hit, ray, range, departure);
             (!found).then_some(range[1])
         });
         found
+    }
+
+    /// Whether a triangle that a ray's line meets counts as in the ray's way.
+    fn hides(
+        &self,
+        primitive: PrimitiveRef,
+        hit: &TriangleHit,
+        ray: Ray,
+        range: [f64; 2],
+        departure: Option<Departure>,
+    ) -> bool {
+        hit.t >= range[0]
+            && hit.t < range[1]
+            && departure.is_none_or(|d| !self.is_left_behind(d, ray.origin, primitive))
+            && self.is_there(primitive, hit)
     }
 
     /// Whether the ray started on this very triangle, or in its plane as far as rounding can tell.
@@ -404,11 +425,7 @@ impl<'a> Tracer<'a> {
         self.instances.visit(ray, range, |instance| {
             let placement = &self.placements[instance as usize];
             let mesh = &self.scene.meshes[placement.mesh];
-            let local = Ray {
-                origin: placement.mesh_from_world
-                    * (ray.origin - placement.world_from_mesh.translation),
-                direction: placement.mesh_from_world * ray.direction,
-            };
+            let local = placement.ray_in_mesh(ray);
             let sheared = ShearedRay::new(local);
             let mut stopped = false;
             self.meshes[placement.mesh].boxes.visit(local, [range[0], end], |triangle| {
