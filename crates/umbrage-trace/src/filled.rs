@@ -70,27 +70,37 @@ impl View<'_> {
             Some(())
         };
 
-        let outline = outline.map(|s| s.surface.position);
+        let positions = outline.map(|s| s.surface.position);
         let to_light = if is_alone {
-            self.beam_to_light(outline, outline.iter().copied())
+            self.beam_to_light(positions, positions.iter().copied())
         } else {
             samples_into(samples)?;
-            self.beam_to_light(outline, samples.iter().map(|s| s.surface.position))
+            self.beam_to_light(positions, samples.iter().map(|s| s.surface.position))
         };
         let are_few = tracer.search(&to_light, blockers);
-        if is_alone {
-            if are_few && blockers.iter().all(|&blocker| blocker == own) {
-                // Surfaces do not hide themselves.
+        blockers.retain(|&blocker| !(is_alone && blocker == own));
+        let truth_by = |s: &Sample, blockers: &[PrimitiveRef]| {
+            self.truth_by(s, |surface, direction, end| {
+                tracer.occluded_among(blockers, surface, direction, end)
+            })
+        };
+        if is_alone && are_few {
+            // What no triangle hides at all is lit everywhere. What a triangle without holes hides
+            // at all corners is dark everywhere.
+            let hides = |&blocker: &PrimitiveRef| {
+                tracer.is_solid(blocker) && outline.iter().all(|s| truth_by(s, &[blocker]) == 0.0)
+            };
+            if blockers.is_empty() {
                 return Some(1.0);
             }
+            if blockers.iter().any(hides) {
+                return Some(0.0);
+            }
+        }
+        if is_alone {
             samples_into(samples)?;
         }
-        let truth = |s: &Sample| match are_few {
-            true => self.truth_by(s, |surface, direction, end| {
-                tracer.occluded_among(blockers, surface, direction, end)
-            }),
-            false => self.truth(s),
-        };
+        let truth = |s: &Sample| if are_few { truth_by(s, blockers) } else { self.truth(s) };
         Some(samples.iter().map(truth).sum::<f32>() / count as f32)
     }
 
