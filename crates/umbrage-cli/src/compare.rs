@@ -8,7 +8,7 @@ use anyhow::Result;
 use umbrage_lab::{
     Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, ReportFolder,
 };
-use umbrage_measure::{Measured, Report};
+use umbrage_measure::{Measured, Report, TruthKind};
 
 /// Compares the techniques, writes the report, and prints a table or the report's JSON.
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
@@ -51,14 +51,16 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
 
 fn table(report: &Report) -> String {
     type Column = (&'static str, fn(&Measured) -> String);
-    const COLUMNS: [Column; 18] = [
+    const COLUMNS: [Column; 20] = [
         ("shadows", |r| r.shadows.clone()),
+        ("truth", |r| r.truth.map_or("-", TruthKind::name).to_owned()),
         ("maps", |r| r.maps.to_string()),
         ("texels", |r| r.texels.to_string()),
         ("KiB", |r| r.bytes.map_or("-".into(), |b| b.div_ceil(1024).to_string())),
         ("wrong", |r| percent(r.metrics.wrong_fraction)),
         ("false light", |r| percent(r.metrics.false_light)),
         ("mean error", |r| number(r.metrics.mean_abs_error, 4)),
+        ("light error", |r| number(r.metrics.light_error, 4)),
         ("FLIP", |r| number(r.metrics.flip, 4)),
         ("flicker", |r| percent(r.flicker)),
         ("noise", |r| number(r.noise, 4)),
@@ -72,6 +74,7 @@ fn table(report: &Report) -> String {
         ("shade ms", |r| number(r.ms.shade, 0)),
     ];
     let is_measured = |name: &str| match name {
+        "truth" => report.truth.area.is_some(),
         "flicker" => report.motion.is_some(),
         "noise" => report.results.iter().any(|r| r.noise.is_some()),
         "filter ms" => report.results.iter().any(|r| r.ms.filter.is_some()),

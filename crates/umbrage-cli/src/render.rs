@@ -7,8 +7,8 @@ use crate::setup::{announce, open_scene, tell_notices};
 use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
-    Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene, Rows,
-    Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan,
+    Certainty, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene,
+    Rows, Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan,
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
@@ -26,6 +26,7 @@ struct Picture {
     texels: Texels,
     shape: Shape,
     noise: Vec<f32>,
+    certainty: Certainty,
 }
 
 /// Which data a picture needs.
@@ -71,6 +72,14 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let height = u64::from(chosen.camera.image()[1]);
     let bar = Bar::new(map_rows + height * needs.passes(), quiet);
     let mut picture = Picture::trace(args, needs, &render_scene, &view, &plan, &bar)?;
+    if let Some(size) = args.light_size {
+        let Certainty { pixels, rays, standard_error } = picture.certainty;
+        note(&format!(
+            "truth: a light of {size}, standard error at most {standard_error:.4} by {:.0} shadow \
+             rays a pixel",
+            rays as f64 / pixels as f64
+        ));
+    }
     if needs.motion {
         let (scene, receivers, look_at) = (&render_scene, &receivers, chosen.look_at);
         let moving = MovingView { scene, receivers, look_at, light, samples: 1 };
@@ -94,7 +103,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
 impl Needs {
     fn of(aov: Aov) -> Self {
         Self {
-            truth: matches!(aov, Aov::Truth | Aov::Difference),
+            truth: aov.shows_truth(),
             maps: !matches!(aov, Aov::Truth | Aov::Depth | Aov::Normal),
             motion: aov == Aov::Minification,
         }
@@ -127,7 +136,14 @@ impl Picture {
         let mut picture = Self::default();
         for range in view.bands() {
             let rows = Rows::new(view, range, &advance);
-            let truth = needs.truth.then(|| rows.truth());
+            let truth = match args.light_size.filter(|_| needs.truth) {
+                Some(size) => {
+                    let (strip, certainty) = rows.area_truth(size)?;
+                    picture.certainty.add(certainty);
+                    Some(strip)
+                }
+                None => needs.truth.then(|| rows.truth()),
+            };
             let strip = if needs.maps { Some(executor.strip(&rows)?) } else { None };
             let shape = match (&truth, &strip) {
                 (Some(truth), _) => truth,

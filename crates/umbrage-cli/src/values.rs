@@ -2,6 +2,8 @@
 
 use anyhow::{Error, Result, anyhow, bail};
 use glam::DVec3;
+use umbrage::language::ParseError;
+use umbrage::visibility::LightSize;
 use umbrage_lab::{Share, values};
 
 /// Parses three finite numbers with commas between them.
@@ -38,6 +40,11 @@ pub(crate) fn field_of_view(text: &str) -> Result<f64> {
     values::opening(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
+/// Parses the size of a light: an angle in degrees or a length in metres.
+pub(crate) fn light_size(text: &str) -> Result<LightSize> {
+    text.parse().map_err(|e: ParseError| anyhow!("{}", e.problem))
+}
+
 /// Parses the width and height of a picture, pixels.
 pub(crate) fn picture_size(text: &str) -> Result<[u32; 2]> {
     // A side that is not a number counts as 0 pixels, which the check below rejects.
@@ -67,6 +74,8 @@ mod tests {
         assert_eq!(pixels_per_texel("1.5").unwrap(), 1.5);
         assert_eq!(field_of_view("60").unwrap(), 60.0);
         assert_eq!(picture_size("960x540").unwrap(), [960, 540]);
+        assert_eq!(light_size("0.53deg").unwrap(), LightSize::Degrees(0.53));
+        assert_eq!(light_size("2m").unwrap(), LightSize::Metres(2.0));
         assert_eq!(share("8/8").unwrap(), Share { index: 8, count: 8 });
     }
 
@@ -89,6 +98,9 @@ mod tests {
             ["", "x", "100", "0x100", "100x0", "16385x1", "16384x8192", "-1x5", "1x2x3", "1.5x2"]
         {
             assert!(picture_size(text).is_err(), "{text}");
+        }
+        for text in ["", "1", "0m", "-1deg", "nanm", "infdeg", "91deg", "2e6m", "1cm", "m"] {
+            assert!(light_size(text).is_err(), "{text}");
         }
         for text in ["", "/", "1", "0/1", "2/1", "1/0", "-1/2", "1/2/3", "a/b", "1/99999999999"] {
             assert!(share(text).is_err(), "{text}");

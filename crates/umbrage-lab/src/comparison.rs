@@ -10,20 +10,21 @@ use crate::picture::{Shadowed, Texels};
 use crate::planning::{self, milliseconds};
 use crate::prepared::PreparedScene;
 use crate::progress::Progress;
-use crate::strip::Rows;
+use crate::strip::{Certainty, Rows};
 use crate::technique::NamedTechnique;
 use crate::view::{ChosenView, ViewOptions, choose_view};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
+use umbrage::visibility::LightSize;
 use umbrage::{Plan, ShadowMap};
 use umbrage_measure::{
     ErrorScale, Image, Measured, Page, Pictures, Report, Rgb, Seen, SeenTruth, Times, Truth,
-    measure, measure_error_px, partition_map, texel_map, write_pictures, write_report,
+    TruthKind, measure, measure_error_px, partition_map, texel_map, write_pictures, write_report,
     write_truth_pictures,
 };
 use umbrage_scene::Scene;
-use umbrage_trace::View;
+use umbrage_trace::{AreaLight, View};
 
 /// The techniques to compare with the truth, and the number of rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +33,10 @@ pub struct ComparisonOptions {
     pub techniques: Vec<NamedTechnique>,
     /// Rays along each side of a pixel, 1 to 64. Renderers shade at pixel centres only, as with 1.
     pub samples: u32,
+    /// Size of the light, for a second truth. The techniques that are
+    /// [soft](NamedTechnique::is_soft) are measured against this truth, and all others against that
+    /// of a point light. `None`: all are measured against the latter.
+    pub light_size: Option<LightSize>,
 }
 
 /// A planned comparison of techniques in one view.
@@ -63,14 +68,29 @@ struct Contender<'a> {
     ms: Times,
     shadowed: Shadowed,
     texels: Texels,
+    /// Perspective error of each pixel, pixels per texel; NaN where no map serves it.
+    perspective: Vec<f32>,
 }
 
-/// The ray-traced picture so far, which is the truth.
+/// The ray-traced pictures so far, which are the truth.
 #[derive(Default)]
 struct TruthSoFar {
     shadowed: Shadowed,
+    /// The picture with the shadows of an area light, if there is one.
+    area: Option<Shadowed>,
+    certainty: Certainty,
     counted: Vec<bool>,
+    /// Cosine between surface and light of each pixel.
+    cosine: Vec<f32>,
     seconds: f64,
+}
+
+/// What every technique's picture is measured by.
+struct Yardstick<'a> {
+    truth: SeenTruth<'a>,
+    /// The kind of the truth, if there are two of them.
+    kind: Option<TruthKind>,
+    cosine: &'a Image<f32>,
 }
 
 /// A finished picture with shadows.
@@ -84,7 +104,8 @@ impl<'a> Comparison<'a> {
     ///
     /// # Errors
     /// An error if the scene has no such camera or light, if the view is not one that a camera can
-    /// have, if the number of rays is out of range, or if the planner refuses a technique.
+    /// have, if the number of rays is out of range, if the light cannot have the size in the options,
+    /// or if the planner refuses a technique.
     pub fn new(
         prepared: &'a PreparedScene<'a>,
         view: &ViewOptions,
@@ -96,6 +117,9 @@ impl<'a> Comparison<'a> {
         let (camera, light) = (chosen_view.camera, chosen_light.light);
         let view = View::new(prepared.render.tracer(), camera, light, options.samples)
             .about(Field::Samples)?;
+        if let Some(size) = options.light_size {
+            AreaLight::new(&view, size).about(Field::LightSize)?;
+        }
         let seen = prepared.render.seen(&prepared.receivers, &camera)?;
         let bounds = prepared.receivers.bounds(seen.as_ref());
         let plan = |t| planning::timed_plan(t, &camera, &light, &bounds);
@@ -120,9 +144,10 @@ impl<'a> Comparison<'a> {
         let plans = self.plans.iter().zip(&self.options.techniques);
         let rows_of_maps: u64 =
             plans.map(|((plan, _), t)| self.prepared.render.rows(plan, t.technique())).sum();
-        // Rows of the picture: its surfaces and the truth, and each technique's lookup and
-        // measuring.
-        rows_of_maps + self.height() * (2 + 2 * self.plans.len() as u64)
+        // Rows of the picture: its surfaces and the truth or truths, and each technique's lookup
+        // and measuring.
+        let truths = 1 + u64::from(self.options.light_size.is_some());
+        rows_of_maps + self.height() * (1 + truths + 2 * self.plans.len() as u64)
     }
 
     /// Returns the number of rows that [`Compared::move_on`] adds.
@@ -152,9 +177,10 @@ impl<'a> Comparison<'a> {
                 ms: Times { plan: Some(*ms), depth: Some(depth), filter, shade: None },
                 shadowed: Shadowed::default(),
                 texels: Texels::default(),
+                perspective: Vec::new(),
             });
         }
-        let truth = trace(&self.view, &mut contenders, progress)?;
+        let truth = trace(&self.view, self.options.light_size, &mut contenders, progress)?;
         Ok(Compared { comparison: self, truth, contenders, motion: None })
     }
 }
@@ -215,13 +241,24 @@ impl Compared<'_> {
         let size = chosen_view.camera.image();
         let seconds = Some(self.truth.seconds);
         let counted = Image::new(size, self.truth.counted)?;
-        let truth = Picture::new(size, self.truth.shadowed)?;
-        let seen =
-            SeenTruth { color: &truth.color, visibility: &truth.visibility, counted: &counted };
-        let truth_pictures = write_truth_pictures(folder, &seen)?;
+        let cosine = Image::new(size, self.truth.cosine)?;
+        let point = Picture::new(size, self.truth.shadowed)?;
+        let area = self.truth.area.map(|shadowed| Picture::new(size, shadowed)).transpose()?;
+        let yardstick = |is_soft| {
+            let truth = area.as_ref().filter(|_| is_soft).unwrap_or(&point);
+            let Picture { color, visibility } = truth;
+            let kind = if is_soft { TruthKind::Area } else { TruthKind::Point };
+            Yardstick {
+                truth: SeenTruth { color, visibility, counted: &counted },
+                kind: area.is_some().then_some(kind),
+                cosine: &cosine,
+            }
+        };
+        let truth_pictures = write_truth_pictures(folder, &yardstick(true).truth)?;
         let finished = self.contenders.into_par_iter().enumerate().map(|(i, contender)| {
             let device = prepared.executors.device();
-            let finished = contender.finish(i + 1, folder, &seen, prepared.scene, device);
+            let yardstick = yardstick(contender.technique.is_soft());
+            let finished = contender.finish(i + 1, folder, &yardstick, prepared.scene, device);
             progress.advance(self.comparison.height());
             finished
         });
@@ -232,7 +269,11 @@ impl Compared<'_> {
             size,
             view: chosen_view.info(),
             light: chosen_light.info(),
-            truth: Truth { rays_per_pixel: options.samples.pow(2), seconds },
+            truth: Truth {
+                rays_per_pixel: options.samples.pow(2),
+                seconds,
+                area: options.light_size.map(|size| self.truth.certainty.of_light(size)),
+            },
             motion: self.motion,
             results,
         };
@@ -255,6 +296,7 @@ impl Compared<'_> {
 /// the CPU reference share the surfaces that the camera's rays hit.
 fn trace(
     view: &View<'_>,
+    light_size: Option<LightSize>,
     contenders: &mut [Contender<'_>],
     progress: &dyn Progress,
 ) -> Result<TruthSoFar, Error> {
@@ -264,10 +306,16 @@ fn trace(
         progress.stage("ray-traced truth");
         let start = Instant::now();
         let rows = Rows::new(view, range.clone(), &advance);
-        let strip = rows.truth();
+        let hard = rows.truth();
+        if let Some(size) = light_size {
+            let (soft, certainty) = rows.area_truth(size)?;
+            truth.area.get_or_insert_default().push(&soft);
+            truth.certainty.add(certainty);
+        }
         truth.seconds += start.elapsed().as_secs_f64();
-        truth.counted.extend(strip.counted());
-        truth.shadowed.push(&strip);
+        truth.counted.extend(hard.counted());
+        truth.cosine.extend(rows.cosines(&hard));
+        truth.shadowed.push(&hard);
         for contender in contenders.iter_mut() {
             progress.stage(&format!("{}: picture", contender.technique));
             let start = Instant::now();
@@ -275,6 +323,7 @@ fn trace(
             *contender.ms.shade.get_or_insert(0.0) += milliseconds(start);
             contender.shadowed.push(&strip);
             contender.texels.push(&strip);
+            contender.perspective.extend(rows.perspective_errors(&hard, contender.plan));
         }
     }
     Ok(truth)
@@ -286,13 +335,15 @@ impl Contender<'_> {
         self,
         index: usize,
         folder: &Path,
-        truth: &SeenTruth<'_>,
+        yardstick: &Yardstick<'_>,
         scene: &Scene,
         device: Option<String>,
     ) -> Result<(Measured, Pictures), Error> {
+        let Yardstick { truth, kind, cosine } = yardstick;
         let size = truth.visibility.size();
         let picture = Picture::new(size, self.shadowed)?;
         let error_px = Image::new(size, self.texels.error)?;
+        let perspective_px = Image::new(size, self.perspective)?;
         let texels = texel_map(&Image::new(size, self.texels.texel)?, &picture.color)?;
         // If a single map serves the whole picture, there is no partition to show.
         let partition = if self.plan.maps.iter().filter(|m| !ShadowMap::is_empty(m)).count() > 1 {
@@ -318,8 +369,10 @@ impl Contender<'_> {
             maps: self.plan.maps.len() as u32,
             texels: self.plan.texels(),
             bytes: Some(self.executor.bytes()),
-            metrics: measure(truth.visibility, &picture.visibility, truth.counted)?,
+            truth: *kind,
+            metrics: measure(truth.visibility, &picture.visibility, truth.counted, cosine)?,
             error_px: measure_error_px(&error_px, truth.counted)?,
+            perspective_px: measure_error_px(&perspective_px, truth.counted)?,
             storage_factor: Some(self.plan.storage_factor()),
             casters_culled: casters_culled(self.plan, &casters(self.plan, scene)),
             flicker: self.flicker,

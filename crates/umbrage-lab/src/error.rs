@@ -37,6 +37,8 @@ pub enum Field {
     MaxError,
     /// Number of rays along each side of a pixel.
     Samples,
+    /// Size of the light in the truth.
+    LightSize,
     /// What shadow maps are fitted to.
     Fit,
     /// Whether alpha-masked materials are treated as solid.
@@ -73,6 +75,7 @@ impl Field {
             Self::Shadows => "shadows",
             Self::MaxError => "max-error",
             Self::Samples => "samples",
+            Self::LightSize => "light-size",
             Self::Fit => "fit",
             Self::Opaque => "opaque",
             Self::Backend => "backend",

@@ -7,7 +7,7 @@ use crate::strip::{Rows, Strip};
 use glam::DVec3;
 use rayon::prelude::*;
 use umbrage::{Camera, Light, Plan, SeenTiles, Technique};
-use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
+use umbrage_render::{EdgeOn, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_scene::Scene;
 use umbrage_trace::{Progress, Reference, Sample, Tracer};
 use umbrage_wgpu::{Casters, LookupBuffers, SeenReadback, ShadowOptions};
@@ -85,7 +85,8 @@ impl<'a> RenderScene<'a> {
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
                 let is_prefiltered = filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
-                Work::Gpu(Box::new(OnGpu { renderer, gpu, timer, plan: None }))
+                let tracer = &self.tracer;
+                Work::Gpu(Box::new(OnGpu { renderer, gpu, tracer, timer, plan: None }))
             }
             None => Work::Reference { tracer: &self.tracer, maps: None },
         };
@@ -108,6 +109,8 @@ pub(crate) enum Work<'a> {
 pub(crate) struct OnGpu<'a> {
     pub(crate) renderer: Renderer<'a, 'a>,
     pub(crate) gpu: &'a Gpu,
+    /// Finds the triangles that the maps of a lamp leave out.
+    tracer: &'a Tracer<'a>,
     /// Measures the time of the prefilter; `None` without a prefilter or without timestamps.
     timer: Option<Timer>,
     /// The plan whose maps are drawn.
@@ -122,6 +125,19 @@ impl OnGpu<'_> {
         let samples = self.renderer.samples(&shading, rows.range(), view.grid(), wants_texels)?;
         Ok(Strip::of_gpu(&samples, view))
     }
+}
+
+/// Returns the triangles that a plan's lamps lie in.
+fn edge_on(plan: &Plan, tracer: &Tracer<'_>) -> Vec<EdgeOn> {
+    let lamps = plan.lights.iter().enumerate().filter_map(|(light, planned)| {
+        let mut maps = plan.maps[planned.maps.clone()].iter();
+        maps.find_map(|m| Some((light, m.apex? + m.origin)))
+    });
+    let triangles = lamps.flat_map(|(light, lamp)| {
+        let found = tracer.edge_on_at(lamp).into_iter();
+        found.map(move |p| EdgeOn { light, instance: p.instance as usize, triangle: p.triangle })
+    });
+    triangles.collect()
 }
 
 impl<'a> Executor<'a> {
@@ -143,7 +159,8 @@ impl<'a> Executor<'a> {
     pub fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<Option<f64>, Error> {
         match &mut self.work {
             Work::Gpu(on) => {
-                let OnGpu { renderer, gpu, timer, plan } = &mut **on;
+                let OnGpu { renderer, gpu, tracer, timer, plan } = &mut **on;
+                renderer.leave_out(edge_on(new, tracer));
                 renderer.draw_maps(new, Casters::Unmoved, timer.as_ref()).on_gpu()?;
                 gpu.wait()?;
                 *plan = Some(new);

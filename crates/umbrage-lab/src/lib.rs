@@ -33,6 +33,7 @@
 //! let options = ComparisonOptions {
 //!     techniques: vec!["uniform@64".parse()?, "lispsm@64".parse()?],
 //!     samples: 1,
+//!     light_size: None,
 //! };
 //! let view = ViewOptions { size: [48, 27], ..ViewOptions::default() };
 //! let scene = open_scene(Path::new(""), "pole")?;
@@ -83,7 +84,7 @@ pub use prepared::PreparedScene;
 pub use progress::Progress;
 pub use receivers::{Fit, Receivers};
 pub use scene::open_scene;
-pub use strip::{NOTHING_TO_SHADOW, Rows, Strip};
+pub use strip::{Certainty, NOTHING_TO_SHADOW, Rows, Strip};
 pub use sweep::{Share, SweepOptions, join_shares, sweep};
 pub use technique::{NamedTechnique, TechniqueError};
 pub use view::{ChosenView, ViewOptions, choose_view};

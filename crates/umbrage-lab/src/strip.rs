@@ -1,10 +1,13 @@
 //! Some rows of a picture with values for each sample, computed by a GPU or the CPU.
 
+use crate::error::{About, Error, Field};
 use glam::Vec3;
 use std::cell::OnceCell;
 use std::ops::Range;
+use umbrage::visibility::LightSize;
 use umbrage::{Camera, Plan};
-use umbrage_trace::{Band, Progress, Reference, Sample, View, shade};
+use umbrage_measure::AreaTruth;
+use umbrage_trace::{AreaLight, AreaVisibility, Band, Progress, Reference, Sample, View, shade};
 
 /// Message about a picture without counted pixels.
 pub const NOTHING_TO_SHADOW: &str = "no pixel shows a surface that faces the light within \
@@ -46,6 +49,45 @@ impl<'a> Rows<'a> {
         Strip::new(self.view, band, band.map(|s| self.view.truth(s), self.progress))
     }
 
+    /// Returns the rows with the ray-traced soft shadows of a light of this size, and how certain
+    /// they are.
+    ///
+    /// # Errors
+    /// An error if the light cannot have this size.
+    pub fn area_truth(&self, size: LightSize) -> Result<(Strip, Certainty), Error> {
+        let area = AreaLight::new(self.view, size).about(Field::LightSize)?;
+        let band = self.band();
+        let seen = band.map(|s| area.visibility(s), self.progress);
+        let strip = Strip::new(self.view, band, seen.iter().map(|v| v.visibility).collect());
+        let certainty = Certainty::of_pixels(&seen, band.samples_per_pixel());
+        Ok((strip, certainty))
+    }
+
+    /// Returns the mean cosine between surface and light of each pixel of `truth`, which must be that
+    /// of these rows, over the samples that count; 0 without any.
+    pub(crate) fn cosines(&self, truth: &Strip) -> impl Iterator<Item = f32> {
+        let cosine = |s: &Sample| shade::incidence(self.view.light(), &s.surface);
+        let cosines = self.band().map(cosine, &|_| {});
+        truth.means(move |i| cosines[i]).map(|mean| mean.unwrap_or(0.0))
+    }
+
+    /// Returns the mean perspective error of each pixel of `truth`, which must be that of these rows,
+    /// over the samples that count, pixels per texel; NaN if none counts or if no map of the plan
+    /// serves one that counts.
+    pub(crate) fn perspective_errors(
+        &self,
+        truth: &Strip,
+        plan: &Plan,
+    ) -> impl Iterator<Item = f32> {
+        let error = |s: &Sample| {
+            let position = s.surface.position;
+            let (map, _) = plan.lookup(0, position).max_by(|a, b| a.1.total_cmp(&b.1))?;
+            plan.maps[map].perspective_error(self.view.camera(), position)
+        };
+        let errors = self.band().map(|s| error(s).map(|e| e.worst as f32), &|_| {});
+        truth.means(move |i| errors[i].unwrap_or(f32::NAN)).map(|mean| mean.unwrap_or(f32::NAN))
+    }
+
     /// Returns the rows without shadows, as if nothing cast any.
     pub fn in_full_light(&self) -> Strip {
         let band = self.band();
@@ -58,6 +100,48 @@ impl<'a> Rows<'a> {
         let visibility = band.map(|s| reference.visibility(0, s), self.progress);
         let lookup = |s: &Sample| Lookup::of(plan, reference, self.view.camera(), s);
         Strip { lookups: band.map(lookup, &|_| {}), ..Strip::new(self.view, band, visibility) }
+    }
+}
+
+/// How certain the truth of an area light is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Certainty {
+    /// Number of pixels.
+    pub pixels: u64,
+    /// Number of shadow rays.
+    pub rays: u64,
+    /// The largest standard error of a pixel's visibility.
+    pub standard_error: f64,
+}
+
+impl Certainty {
+    /// The certainty of pixels with `n` samples each.
+    fn of_pixels(seen: &[AreaVisibility], n: usize) -> Self {
+        let standard_error = |pixel: &[AreaVisibility]| {
+            let variances = pixel.iter().map(|v| f64::from(v.standard_error).powi(2));
+            variances.sum::<f64>().sqrt() / n as f64
+        };
+        Self {
+            pixels: (seen.len() / n) as u64,
+            rays: seen.iter().map(|v| u64::from(v.rays)).sum(),
+            standard_error: seen.chunks(n).map(standard_error).fold(0.0, f64::max),
+        }
+    }
+
+    /// Returns the certainty in the form that reports show, for a light of this size.
+    pub(crate) fn of_light(self, size: LightSize) -> AreaTruth {
+        AreaTruth {
+            light_size: size.to_string(),
+            standard_error: self.standard_error,
+            shadow_rays_per_pixel: self.rays as f64 / self.pixels as f64,
+        }
+    }
+
+    /// Adds the certainty of other pixels.
+    pub fn add(&mut self, other: Self) {
+        self.pixels += other.pixels;
+        self.rays += other.rays;
+        self.standard_error = self.standard_error.max(other.standard_error);
     }
 }
 

@@ -140,6 +140,7 @@ fn begin(options: &SweepOptions) -> Result<Begun, Error> {
         max_error: options.max_error,
         size: options.size,
         samples: comparison.samples,
+        light_size: comparison.light_size.map(|size| size.to_string()),
         opaque: options.opaque,
         fit: options.fit.name().into(),
         backend: executors.name().into(),

@@ -4,6 +4,7 @@ use crate::error::{Error, Field};
 use std::fmt::{self, Display};
 use std::str::FromStr;
 use umbrage::language::ParseError;
+use umbrage::visibility::{Blur, Filter, Prefilter, Width};
 use umbrage::{Error as PlanError, Size, Technique};
 
 /// Largest side of a shadow map, texels, which is the limit of today's GPUs.
@@ -38,6 +39,19 @@ impl NamedTechnique {
     /// Returns whether the text gives a size: a number of texels or a largest error.
     pub fn is_sized(&self) -> bool {
         self.text.contains('@')
+    }
+
+    /// Returns whether the technique means to show soft shadows as a light with a size throws them. A
+    /// blur of a width in metres does so, too, though its width is the same everywhere.
+    pub fn is_soft(&self) -> bool {
+        match self.technique.filter {
+            Filter::None | Filter::Hard | Filter::Pcf { .. } => false,
+            Filter::Spread { width, .. } => matches!(width, Width::Metres(_)),
+            Filter::Pcss { .. } => true,
+            Filter::Prefiltered(Prefilter { blur, .. }) => {
+                matches!(blur, Blur::Width(Width::Metres(_)))
+            }
+        }
     }
 
     /// Makes the planner take the fewest texels with which errors are at most this many pixels per
@@ -151,6 +165,17 @@ mod tests {
         assert_eq!(with("lispsm+z4"), Size::MaxError(0.5));
         assert_eq!(with("lispsm@512"), Size::Budget(512 * 512));
         assert_eq!(with("lispsm@64x32"), Size::Exact([64, 32]));
+    }
+
+    #[test]
+    fn softness_is_a_penumbra_in_metres_or_degrees() {
+        let is_soft = |text: &str| text.parse::<NamedTechnique>().unwrap().is_soft();
+        for text in ["uniform:pcss", "psm:pcf5(blur=0.2m)", "tsm:vsm(blur=0.1m)"] {
+            assert!(is_soft(text), "{text}");
+        }
+        for text in ["none", "uniform", "psm:pcf5", "psm:pcf5(blur=2px)", "tsm:vsm(blur=7)"] {
+            assert!(!is_soft(text), "{text}");
+        }
     }
 
     #[test]

@@ -41,7 +41,7 @@ impl Progress for Memory {
 
 fn options() -> ComparisonOptions {
     let techniques = ["uniform@32", "log@32"].map(|text| text.parse().unwrap());
-    ComparisonOptions { techniques: techniques.to_vec(), samples: 2 }
+    ComparisonOptions { techniques: techniques.to_vec(), samples: 2, light_size: None }
 }
 
 #[test]

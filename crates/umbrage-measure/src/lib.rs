@@ -37,6 +37,6 @@ pub use page::{
     FigureFile, FigureShown, FiguresPage, Page, SweepPage, write_figures, write_report, write_sweep,
 };
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
-pub use report::{LightInfo, Measured, Motion, Report, Times, Truth, View};
+pub use report::{AreaTruth, LightInfo, Measured, Motion, Report, Times, Truth, TruthKind, View};
 pub use sweep::{Mean, Sweep, SweepSettings, SweptView};
 pub use temporary::{TEMPORARY, TemporaryFolder, exit_without_traces, remove_abandoned};

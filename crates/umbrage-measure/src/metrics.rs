@@ -21,6 +21,11 @@ pub struct Metrics {
     pub false_shadow: Option<f64>,
     /// Mean of |visibility − truth|, from 0 to 1.
     pub mean_abs_error: Option<f64>,
+    /// Mean of |visibility − truth|, from 0 to 1, in which a pixel weighs as much as the cosine
+    /// between its surface's normal and the direction to the light: errors count as much as they
+    /// show on a diffuse surface. `None` if the light meets all surfaces edge-on.
+    #[serde(default)]
+    pub light_error: Option<f64>,
     /// Mean of ꟻLIP (Andersson et al. 2020) between the two visibility images as 8-bit grey, at
     /// [`nv_flip::DEFAULT_PIXELS_PER_DEGREE`] (67, a desktop monitor), over all pixels of the
     /// picture. Pixels that are not counted have the truth's value in both images. From 0 to 1.
@@ -47,19 +52,27 @@ pub struct ErrorPx {
 
 /// Compares `technique` with `truth`. Both are visibilities from 0 (in shadow) to 1 (lit); values
 /// outside, which filters that overshoot give, are clamped. `counted` marks the pixels that show a
-/// surface facing the light; values at other pixels do not matter.
+/// surface facing the light; values at other pixels do not matter. `cosine` is that of the angle
+/// between the surface's normal and the direction to the light, from 0 to 1.
 ///
 /// # Errors
-/// The sizes differ, or a visibility at a counted pixel is not finite.
+/// The sizes differ, or a visibility or cosine at a counted pixel is not finite.
 pub fn measure(
     truth: &Image<f32>,
     technique: &Image<f32>,
     counted: &Image<bool>,
+    cosine: &Image<f32>,
 ) -> Result<Metrics, Error> {
     check_visibilities(truth, technique, counted)?;
+    cosine.check_like(truth, "cosine")?;
+    check_finite("cosine", cosine, counted)?;
     let (mut n, mut false_light, mut false_shadow, mut sum) = (0_u64, 0_u64, 0_u64, 0.0);
-    for difference in differences(truth, technique, counted).flatten() {
+    let (mut weights, mut weighed) = (0.0, 0.0);
+    let pixels = differences(truth, technique, counted).zip(cosine.pixels());
+    for (difference, cosine) in pixels.filter_map(|(d, &c)| Some((d?, c.clamp(0.0, 1.0)))) {
         n += 1;
+        weights += f64::from(cosine);
+        weighed += f64::from(cosine) * f64::from(difference.abs());
         false_light += u64::from(difference > 0.5);
         false_shadow += u64::from(difference < -0.5);
         sum += f64::from(difference.abs());
@@ -74,6 +87,7 @@ pub fn measure(
         false_light: share(false_light),
         false_shadow: share(false_shadow),
         mean_abs_error: Some(sum / n as f64),
+        light_error: (weights > 0.0).then(|| weighed / weights),
         flip: Some(flip(truth, technique, counted)),
     })
 }
@@ -154,17 +168,23 @@ pub(crate) fn check_visibilities(
 ) -> Result<(), Error> {
     technique.check_like(truth, "visibility")?;
     counted.check_like(truth, "mask of counted pixels")?;
-    for (what, image) in [("truth", truth), ("visibility", technique)] {
-        let values = image.pixels().iter().zip(counted.pixels());
-        if let Some(i) = values.clone().position(|(v, &counted)| counted && !v.is_finite()) {
-            return Err(Error::NotFinite {
-                what,
-                pixel: image.position(i),
-                value: image.pixels()[i],
-            });
+    check_finite("truth", truth, counted)?;
+    check_finite("visibility", technique, counted)
+}
+
+fn check_finite(
+    what: &'static str,
+    image: &Image<f32>,
+    counted: &Image<bool>,
+) -> Result<(), Error> {
+    let mut values = image.pixels().iter().zip(counted.pixels());
+    match values.position(|(v, &counted)| counted && !v.is_finite()) {
+        Some(i) => {
+            let (pixel, value) = (image.position(i), image.pixels()[i]);
+            Err(Error::NotFinite { what, pixel, value })
         }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 fn flip(truth: &Image<f32>, technique: &Image<f32>, counted: &Image<bool>) -> f64 {
@@ -200,12 +220,15 @@ mod tests {
         let truth = image([6, 1], &[0.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
         let technique = image([6, 1], &[1.0, 0.0, 0.5, 1.0, 0.75, 1.5]);
         let counted = image([6, 1], &[true, true, true, false, true, true]);
-        let m = measure(&truth, &technique, &counted).unwrap();
+        let cosine = image([6, 1], &[1.0, 0.5, 0.0, 1.0, 0.25, 0.25]);
+        let m = measure(&truth, &technique, &counted, &cosine).unwrap();
         assert_eq!(m.counted, 5);
         assert_eq!(m.wrong_fraction, Some(2.0 / 5.0));
         assert_eq!(m.false_light, Some(1.0 / 5.0));
         assert_eq!(m.false_shadow, Some(1.0 / 5.0));
         assert_eq!(m.mean_abs_error, Some(2.75 / 5.0));
+        // The differences 1, 1, ½, ¼ and 0 weigh 1, ½, 0, ¼ and ¼.
+        assert_eq!(m.light_error, Some(1.5625 / 2.0));
     }
 
     #[test]
@@ -215,6 +238,8 @@ mod tests {
         let half = Image::from_fn(size, |x, y| f32::from(x >= 20) * f32::from(y < 15)).unwrap();
         let all = truth.map(|_| true);
         let upper = Image::from_fn(size, |_, y| y < 15).unwrap();
+        let measure =
+            |truth, technique, counted| measure(truth, technique, counted, &all.map(|_| 1.0));
         assert_eq!(measure(&truth, &truth, &all).unwrap().flip, Some(0.0));
         assert_eq!(measure(&truth, &half, &upper).unwrap().flip, Some(0.0));
         // A quarter of the picture changes from white to black: ꟻLIP is near 1 inside the quarter,
@@ -227,7 +252,7 @@ mod tests {
     fn nothing_counted_is_no_praise() {
         let v = image([2, 2], &[f32::NAN; 4]);
         let none = v.map(|_| false);
-        assert_eq!(measure(&v, &v, &none).unwrap(), Metrics::default());
+        assert_eq!(measure(&v, &v, &none, &v).unwrap(), Metrics::default());
         assert_eq!(measure_error_px(&v, &none).unwrap(), ErrorPx::default());
         assert_eq!(worst_spot(&v, &v, &none).unwrap(), None);
     }
@@ -236,7 +261,7 @@ mod tests {
     fn tiny_images_have_metrics() {
         let (dark, lit, counted) =
             (image([1, 1], &[0.0]), image([1, 1], &[1.0]), image([1, 1], &[true]));
-        let m = measure(&dark, &lit, &counted).unwrap();
+        let m = measure(&dark, &lit, &counted, &lit).unwrap();
         assert_eq!(m.wrong_fraction, Some(1.0));
         assert!(m.flip.unwrap() > 0.5, "{m:?}");
     }
@@ -245,6 +270,7 @@ mod tests {
     fn names_what_is_wrong() {
         let (a, b) = (image([2, 1], &[0.0; 2]), image([1, 2], &[0.0; 2]));
         let counted = a.map(|_| true);
+        let measure = |truth, technique, counted| measure(truth, technique, counted, &a);
         let text = |e: Result<Metrics, Error>| e.unwrap_err().to_string();
         assert_eq!(
             text(measure(&a, &b, &counted)),
@@ -258,6 +284,30 @@ mod tests {
         assert_eq!(text(measure(&nan, &a, &counted)), "truth: pixel (1, 0) is NaN, must be finite");
         assert!(matches!(Image::<f32>::new([0, 4], vec![]), Err(Error::Size { .. })));
         assert!(matches!(Image::new([2, 2], vec![1.0]), Err(Error::Values { values: 1, .. })));
+    }
+
+    #[test]
+    fn edge_on_surfaces_count_as_little_as_they_show() {
+        // Half of a sphere's picture is wrong: the outer half of its radius, where the light behind
+        // the viewer meets it at a slant. The mean of the cosine √(1 − r²) over the disc is 2/3, and
+        // beyond r = a it is (1 − a²)^(3/2) of that.
+        let n = 400;
+        let radius = |x: u32, y: u32| {
+            let at = |i: u32| (2.0 * f64::from(i) + 1.0) / f64::from(n) - 1.0;
+            at(x).hypot(at(y))
+        };
+        let picture = |value: &dyn Fn(f64) -> f64| {
+            Image::from_fn([n, n], |x, y| value(radius(x, y)) as f32).unwrap()
+        };
+        let truth = picture(&|_| 1.0);
+        let technique = picture(&|r| f64::from(r < 0.5));
+        let cosine = picture(&|r| (1.0 - r * r).max(0.0).sqrt());
+        let counted = Image::from_fn([n, n], |x, y| radius(x, y) < 1.0).unwrap();
+        let m = measure(&truth, &technique, &counted, &cosine).unwrap();
+        assert!((m.mean_abs_error.unwrap() - 0.75).abs() < 1e-3, "{m:?}");
+        assert!((m.light_error.unwrap() - 0.75f64.powf(1.5)).abs() < 1e-3, "{m:?}");
+        let edge_on = measure(&truth, &technique, &counted, &truth.map(|_| 0.0)).unwrap();
+        assert_eq!(edge_on.light_error, None);
     }
 
     #[test]

@@ -84,12 +84,47 @@ pub enum LightInfo {
 }
 
 /// How the truth was computed.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
     /// Number of primary rays per pixel; each has one shadow ray to the light itself.
     pub rays_per_pixel: u32,
     /// Wall-clock time of tracing all rays, seconds.
     pub seconds: Option<f64>,
+    /// The second truth, of a light with a size; `None` if there is only that of the point light. In
+    /// the JSON, its fields stand beside the others.
+    #[serde(default, flatten)]
+    pub area: Option<AreaTruth>,
+}
+
+/// How the truth of a light with a size was computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AreaTruth {
+    /// The size, as in `0.53deg` or `0.2m`.
+    pub light_size: String,
+    /// The largest standard error of the visibility of any pixel, as estimated from its rays.
+    pub standard_error: f64,
+    /// The mean number of shadow rays per pixel.
+    pub shadow_rays_per_pixel: f64,
+}
+
+/// Which of two truths a technique is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TruthKind {
+    /// That of the light as a point, or as a direction: sharp shadows.
+    Point,
+    /// That of the light with its size: soft shadows.
+    Area,
+}
+
+impl TruthKind {
+    /// `point` or `area`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Area => "area",
+        }
+    }
 }
 
 /// A motion: a sequence of frames.
@@ -123,11 +158,17 @@ pub struct Measured {
     /// maps; gutters and mip levels included.
     #[serde(default)]
     pub bytes: Option<u64>,
+    /// The truth that the technique is measured against; `None` if there is only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthKind>,
     /// Distance from the truth. In the JSON, these fields stand beside the others.
     #[serde(flatten)]
     pub metrics: Metrics,
     /// Pixels per texel on the visible surfaces.
     pub error_px: ErrorPx,
+    /// Pixels per texel at the visible surfaces, without their slope towards the light.
+    #[serde(default)]
+    pub perspective_px: ErrorPx,
     /// Texels needed per pixel of the picture for an error of 1 (Lloyd et al. 2006, Eq. 12).
     pub storage_factor: Option<f64>,
     /// Share of the triangles that need not be drawn into a map, as the mean over the maps that
@@ -209,7 +250,15 @@ pub(crate) mod tests {
                 false_light: wrong,
                 false_shadow: wrong.map(|_| 0.0),
                 mean_abs_error: wrong,
+                light_error: wrong,
                 flip: wrong,
+            },
+            truth: None,
+            perspective_px: ErrorPx {
+                p50: Some(0.3),
+                p95: Some(1.0),
+                max: Some(1.5),
+                undefined: 7,
             },
             error_px: ErrorPx {
                 p50: Some(0.1 + 0.2),
@@ -236,7 +285,7 @@ pub(crate) mod tests {
                 far: 500.0,
             },
             light: LightInfo::Directional { name: None, direction: [0.0, -1.0, 0.0] },
-            truth: Truth { rays_per_pixel: 16, seconds: Some(1.25) },
+            truth: Truth { rays_per_pixel: 16, seconds: Some(1.25), area: None },
             motion: None,
             results: wrong.iter().enumerate().map(result).collect(),
         }
@@ -257,8 +306,9 @@ pub(crate) mod tests {
         let expected = json!({
             "shadows": "lambda=0@1024", "backend": "reference", "maps": 1, "texels": 1_u64 << 40, "bytes": 1_u64 << 42,
             "counted_pixels": 1000, "wrong_fraction": 0.25, "false_light": 0.25, "false_shadow": 0.0,
-            "mean_abs_error": 0.25, "flip": 0.25,
+            "mean_abs_error": 0.25, "light_error": 0.25, "flip": 0.25,
             "error_px": {"p50": 0.1 + 0.2, "p95": 2.0, "max": 3.5, "undefined": 7},
+            "perspective_px": {"p50": 0.3, "p95": 1.0, "max": 1.5, "undefined": 7},
             "storage_factor": 865.16,
             "casters_culled": 0.25,
             "ms": {"plan": 0.004, "depth": 812.5, "filter": null, "shade": 95.25},
@@ -280,6 +330,26 @@ pub(crate) mod tests {
         let json: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(json["motion"], json!({"kind": "orbit", "frames": 6}));
         assert_eq!(json["results"][0]["flicker"], 0.086);
+        assert_eq!(Report::from_json(&text).unwrap(), report);
+    }
+
+    /// Reports with one truth have no field that tells two apart.
+    #[test]
+    fn a_second_truth_is_told_where_there_is_one() {
+        let mut report = report(&[Some(0.25)]);
+        assert!(!report.to_json().unwrap().contains("light_size"));
+        let light_size = "0.53deg".to_owned();
+        report.truth.area =
+            Some(AreaTruth { light_size, standard_error: 0.0037, shadow_rays_per_pixel: 123.5 });
+        report.results[0].truth = Some(TruthKind::Area);
+        let text = report.to_json().unwrap();
+        let json: Value = serde_json::from_str(&text).unwrap();
+        let expected = json!({
+            "rays_per_pixel": 16, "seconds": 1.25,
+            "light_size": "0.53deg", "standard_error": 0.0037, "shadow_rays_per_pixel": 123.5,
+        });
+        assert_eq!(json["truth"], expected);
+        assert_eq!(json["results"][0]["truth"], "area");
         assert_eq!(Report::from_json(&text).unwrap(), report);
     }
 

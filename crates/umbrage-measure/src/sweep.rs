@@ -1,6 +1,6 @@
 //! Comparisons over many views, with their tables and means.
 
-use crate::{Error, ErrorPx, LightInfo, Measured, Metrics, Report, View};
+use crate::{Error, ErrorPx, LightInfo, Measured, Metrics, Report, TruthKind, View};
 use serde::{Deserialize, Serialize};
 
 /// A comparison of the same techniques in many views.
@@ -29,6 +29,10 @@ pub struct SweepSettings {
     pub size: [u32; 2],
     /// Number of rays along each side of a pixel.
     pub samples: u32,
+    /// Size of the lights, as in `0.53deg`, for the truth that soft techniques are measured against;
+    /// `None` if all are measured against that of the point light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_size: Option<String>,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
     /// Which receivers the maps are fitted to: those in one `box`, or the `surfaces`.
@@ -203,7 +207,7 @@ impl Sweep {
 
 /// The columns of `results.csv` that follow the columns of the view.
 type CsvColumn = (&'static str, fn(&Measured) -> String);
-const CSV: [CsvColumn; 18] = [
+const CSV: [CsvColumn; 24] = [
     ("shadows", |r| r.shadows.clone()),
     ("backend", |r| r.backend.clone()),
     ("maps", |r| r.maps.to_string()),
@@ -213,14 +217,20 @@ const CSV: [CsvColumn; 18] = [
     ("false_light", |r| number(r.metrics.false_light)),
     ("false_shadow", |r| number(r.metrics.false_shadow)),
     ("mean_abs_error", |r| number(r.metrics.mean_abs_error)),
+    ("light_error", |r| number(r.metrics.light_error)),
     ("flip", |r| number(r.metrics.flip)),
     ("error_px_p50", |r| number(r.error_px.p50)),
     ("error_px_p95", |r| number(r.error_px.p95)),
     ("error_px_max", |r| number(r.error_px.max)),
     ("error_px_undefined", |r| r.error_px.undefined.to_string()),
+    ("perspective_px_p50", |r| number(r.perspective_px.p50)),
+    ("perspective_px_p95", |r| number(r.perspective_px.p95)),
+    ("perspective_px_max", |r| number(r.perspective_px.max)),
+    ("perspective_px_undefined", |r| r.perspective_px.undefined.to_string()),
     ("storage_factor", |r| number(r.storage_factor)),
     ("casters_culled", |r| number(r.casters_culled)),
     ("bytes", |r| r.bytes.map(|b| b.to_string()).unwrap_or_default()),
+    ("truth", |r| r.truth.map_or("", TruthKind::name).to_owned()),
     ("error", |_| String::new()),
 ];
 
@@ -269,9 +279,12 @@ struct ResultJson<'a> {
     maps: u32,
     texels: u64,
     bytes: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth: Option<TruthKind>,
     #[serde(flatten)]
     metrics: &'a Metrics,
     error_px: &'a ErrorPx,
+    perspective_px: &'a ErrorPx,
     storage_factor: Option<f64>,
     casters_culled: Option<f64>,
 }
@@ -288,8 +301,10 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             maps,
             texels,
             bytes,
+            truth,
             metrics,
             error_px,
+            perspective_px,
             storage_factor,
             casters_culled,
             flicker: _,
@@ -304,8 +319,10 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             maps: *maps,
             texels: *texels,
             bytes: *bytes,
+            truth: *truth,
             metrics,
             error_px,
+            perspective_px,
             storage_factor: *storage_factor,
             casters_culled: *casters_culled,
         }
@@ -352,6 +369,7 @@ pub(crate) mod tests {
                 max_error: None,
                 size: [64, 48],
                 samples: 4,
+                light_size: None,
                 opaque: true,
                 fit: "surfaces".to_owned(),
                 backend: "reference".to_owned(),

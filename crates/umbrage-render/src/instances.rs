@@ -28,6 +28,21 @@ pub(crate) struct Instances {
 pub(crate) struct Draw {
     pub(crate) mesh: usize,
     pub(crate) instances: Range<u32>,
+    /// The mesh's triangles that are drawn.
+    pub(crate) triangles: Range<u32>,
+}
+
+/// A triangle that is edge-on to a lamp and is left out of the lamp's maps. Seen from the lamp it has
+/// no area, but if it touches the lamp, single precision may put it before the lamp, where it would
+/// hide everything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EdgeOn {
+    /// Index of the light in the plan.
+    pub light: usize,
+    /// Index in [`Scene::instances`](umbrage_scene::Scene::instances).
+    pub instance: usize,
+    /// Index in [`Mesh::triangles`](umbrage_scene::Mesh::triangles).
+    pub triangle: u32,
 }
 
 /// A range of draws: those of a map, or those of the picture.
@@ -61,17 +76,26 @@ impl Instances {
         }
     }
 
-    /// Adds all instances whose box `is_drawn`, with one draw for those of one mesh.
+    /// Adds all instances whose box `is_drawn`, with one draw for those of one mesh as long as no
+    /// triangle of theirs is `left_out`. The triangles that are left out of an instance ascend.
     pub(crate) fn add(
         &mut self,
         scene: &SceneBuffers<'_>,
         is_drawn: impl Fn(Aabb) -> bool,
+        left_out: impl Iterator<Item = EdgeOn> + Clone,
     ) -> DrawList {
         let first_draw = self.draws.len();
         for (i, instance) in scene.instances.iter().enumerate() {
-            if is_drawn(instance.bounds) {
-                self.push(first_draw, instance.mesh, i);
+            if !is_drawn(instance.bounds) {
+                continue;
             }
+            let all = scene.meshes[instance.mesh].triangles();
+            let mut first = 0;
+            for left_out in left_out.clone().filter(|e| e.instance == instance.instance) {
+                self.push(first_draw, instance.mesh, i, first..left_out.triangle);
+                first = left_out.triangle + 1;
+            }
+            self.push(first_draw, instance.mesh, i, first..all);
         }
         first_draw..self.draws.len()
     }
@@ -99,19 +123,25 @@ impl Instances {
         let first_draw = self.draws.len();
         for k in 0..self.order.len() {
             let i = self.order[k] as u32 as usize;
-            self.push(first_draw, scene.instances[i].mesh, i);
+            let mesh = scene.instances[i].mesh;
+            self.push(first_draw, mesh, i, 0..scene.meshes[mesh].triangles());
         }
         first_draw..self.draws.len()
     }
 
-    /// Adds an instance to the last draw, or to a new one if that draws another mesh or is not of
-    /// the list that begins with `first_draw`.
-    fn push(&mut self, first_draw: usize, mesh: usize, instance: usize) {
+    /// Adds triangles of an instance to the last draw, or to a new one if that draws another mesh,
+    /// other triangles, or is not of the list that begins with `first_draw`.
+    fn push(&mut self, first_draw: usize, mesh: usize, instance: usize, triangles: Range<u32>) {
+        if triangles.is_empty() {
+            return;
+        }
         let index = self.list.len() as u32;
         self.list.push(self.all[instance]);
         match self.draws[first_draw..].last_mut() {
-            Some(draw) if draw.mesh == mesh => draw.instances.end = index + 1,
-            _ => self.draws.push(Draw { mesh, instances: index..index + 1 }),
+            Some(draw) if draw.mesh == mesh && draw.triangles == triangles => {
+                draw.instances.end = index + 1;
+            }
+            _ => self.draws.push(Draw { mesh, instances: index..index + 1, triangles }),
         }
     }
 

@@ -18,6 +18,7 @@ mod view;
 
 pub use error::Error;
 pub use gpu::{AdapterReport, Gpu, devices};
+pub use instances::EdgeOn;
 pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;

@@ -1,4 +1,4 @@
-use crate::instances::{Draw, DrawList, Instances};
+use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::points::Points;
 use crate::scene::{Attributes, SceneBuffers};
 use crate::timer::Timer;
@@ -42,6 +42,7 @@ pub struct Renderer<'g, 's> {
     /// Pipelines by the names of their fragment shaders, made at first use.
     pictures: HashMap<&'static str, Pipelines>,
     instances: Instances,
+    edge_on: Vec<EdgeOn>,
     eye: DVec3,
 }
 
@@ -194,6 +195,7 @@ impl<'g, 's> Renderer<'g, 's> {
             layout,
             pictures: HashMap::new(),
             instances: Instances::new(gpu),
+            edge_on: Vec::new(),
             eye: DVec3::ZERO,
         })
     }
@@ -201,6 +203,12 @@ impl<'g, 's> Renderer<'g, 's> {
     /// The shadow maps, as `umbrage_wgpu` holds them.
     pub fn shadows(&self) -> &Shadows {
         &self.shadows
+    }
+
+    /// Leaves these triangles out of the maps of their lights from now on. Those of one instance must
+    /// ascend.
+    pub fn leave_out(&mut self, edge_on: Vec<EdgeOn>) {
+        self.edge_on = edge_on;
     }
 
     /// Draws those of the plan's maps that are out of date, without waiting for the device. Returns
@@ -214,14 +222,18 @@ impl<'g, 's> Renderer<'g, 's> {
         casters: Casters<'_>,
         timer: Option<&Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
-        let Self { gpu, scene, shadows, instances, opaque, masked, masks, .. } = self;
+        let Self { gpu, scene, shadows, instances, opaque, masked, masks, edge_on, .. } = self;
         let frame = Frame { plan, render_origin: plan.origin, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = plan.origin;
         instances.begin(scene, plan.origin);
         let lists: Vec<DrawList> = prepared
             .stale()
-            .map(|redraw| instances.add(scene, |aabb| redraw.may_cast(aabb)))
+            .map(|redraw| {
+                let light = plan.maps[redraw.index].part.light;
+                let left_out = edge_on.iter().filter(|e| e.light == light).copied();
+                instances.add(scene, |aabb| redraw.may_cast(aabb), left_out)
+            })
             .collect();
         let mut drawn: Vec<(usize, Drawn)> = Vec::with_capacity(lists.len());
         if lists.is_empty() {
@@ -515,9 +527,11 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 
     fn draw(&mut self, draw: &Draw) {
         let mesh = &self.scene.meshes[draw.mesh];
-        self.pass.draw_indexed(mesh.indices.clone(), mesh.first_vertex, draw.instances.clone());
+        let first = mesh.indices.start;
+        let indices = first + 3 * draw.triangles.start..first + 3 * draw.triangles.end;
+        self.pass.draw_indexed(indices, mesh.first_vertex, draw.instances.clone());
         self.drawn.draws += 1;
-        self.drawn.triangles += mesh.indices.len() as u64 / 3 * draw.instances.len() as u64;
+        self.drawn.triangles += draw.triangles.len() as u64 * draw.instances.len() as u64;
     }
 }
 

@@ -3,7 +3,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use umbrage::Aabb;
-use umbrage_scene::{Alpha, Material, Mesh, Scene, Texture, Wrap};
+use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
@@ -29,6 +29,8 @@ pub struct SceneBuffers<'a> {
 
 /// An instance of a mesh.
 pub(crate) struct Drawable {
+    /// Index in [`Scene::instances`].
+    pub(crate) instance: usize,
     /// Index of the mesh.
     pub(crate) mesh: usize,
     pub(crate) world_from_mesh: DAffine3,
@@ -42,6 +44,13 @@ pub(crate) struct MeshRange {
     pub(crate) indices: std::ops::Range<u32>,
     pub(crate) first_vertex: i32,
     pub(crate) material: usize,
+}
+
+impl MeshRange {
+    /// Number of triangles.
+    pub(crate) fn triangles(&self) -> u32 {
+        self.indices.len() as u32 / 3
+    }
 }
 
 /// A material, for meshes with or for meshes without texture coordinates.
@@ -123,11 +132,11 @@ impl<'a> SceneBuffers<'a> {
         });
         let meshes: Vec<MeshRange> = meshes.collect();
         let boxes = scene.instance_boxes();
-        let drawable = scene.instances.iter().zip(boxes).map(|(instance, bounds)| Drawable {
-            mesh: instance.mesh,
-            world_from_mesh: instance.world_from_mesh,
-            bounds,
-        });
+        let drawable =
+            scene.instances.iter().zip(boxes).enumerate().map(|(i, (placed, bounds))| {
+                let Instance { mesh, world_from_mesh } = *placed;
+                Drawable { instance: i, mesh, world_from_mesh, bounds }
+            });
         let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
         instances.sort_by_key(|i| i.mesh);
         let buffers = Self {

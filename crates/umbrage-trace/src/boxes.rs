@@ -80,6 +80,22 @@ impl Boxes {
         }
     }
 
+    /// The primitives whose boxes are within `reach` of a point along every axis, and some more.
+    pub(crate) fn around(&self, point: DVec3, reach: f64) -> Vec<u32> {
+        let mut open: Vec<Node> = self.root().into_iter().collect();
+        let mut found = Vec::new();
+        while let Some(node) = open.pop() {
+            let Aabb { min, max } = self.aabb(node);
+            if point.clamp(min, max).abs_diff_eq(point, reach) {
+                match self.open(node) {
+                    Ok(nodes) => open.extend(nodes),
+                    Err(leaf) => found.extend(leaf),
+                }
+            }
+        }
+        found
+    }
+
     /// Calls `visit` with the index of each primitive whose box the ray may meet in `range`,
     /// roughly nearest first. `visit` returns the new end of the range, or `None` to stop the
     /// search.

@@ -25,6 +25,12 @@ pub enum Error {
         /// The largest valid number.
         max: u32,
     },
+    /// The size of an area light is not one that this kind of light can have.
+    #[error("light size: {problem}")]
+    LightSize {
+        /// What is wrong and what would be right.
+        problem: String,
+    },
 }
 
 impl Error {

@@ -3,7 +3,6 @@
 use crate::tracer::{Beam, End};
 use crate::{PrimitiveRef, Sample, View};
 use glam::DVec3;
-use umbrage::Light;
 
 /// Surfaces count as one plane if the cosine of the angle between their normals is above this value.
 const SAME_PLANE: f64 = 0.99;
@@ -79,16 +78,12 @@ impl View<'_> {
         };
         let are_few = tracer.search(&to_light, blockers);
         blockers.retain(|&blocker| !(is_alone && blocker == own));
-        let truth_by = |s: &Sample, blockers: &[PrimitiveRef]| {
-            self.truth_by(s, |surface, direction, end| {
-                tracer.occluded_among(blockers, surface, direction, end)
-            })
-        };
         if is_alone && are_few {
             // What no triangle hides at all is lit everywhere. What a triangle without holes hides
             // at all corners is dark everywhere.
             let hides = |&blocker: &PrimitiveRef| {
-                tracer.is_solid(blocker) && outline.iter().all(|s| truth_by(s, &[blocker]) == 0.0)
+                tracer.is_solid(blocker)
+                    && outline.iter().all(|s| self.truth_among(Some(&[blocker]), s) == 0.0)
             };
             if blockers.is_empty() {
                 return Some(1.0);
@@ -100,7 +95,8 @@ impl View<'_> {
         if is_alone {
             samples_into(samples)?;
         }
-        let truth = |s: &Sample| if are_few { truth_by(s, blockers) } else { self.truth(s) };
+        let among = are_few.then_some(&blockers[..]);
+        let truth = |s: &Sample| self.truth_among(among, s);
         Some(samples.iter().map(truth).sum::<f32>() / count as f32)
     }
 
@@ -110,10 +106,9 @@ impl View<'_> {
         outline: [DVec3; 4],
         points: impl Iterator<Item = DVec3> + Clone,
     ) -> Beam {
-        let end = match self.light() {
-            Light::Directional { direction } => End::Endless(-*direction),
-            Light::Spot(spot) => End::Point(spot.position),
-            Light::Point(point) => End::Point(point.position),
+        let end = match self.light().position() {
+            Some(lamp) => End::Point(lamp),
+            None => End::Endless(self.light().direction_to_light(outline[0])),
         };
         Beam::of_points(outline, points, end)
     }
@@ -123,7 +118,7 @@ impl View<'_> {
 mod tests {
     use super::*;
     use crate::Tracer;
-    use umbrage::{Camera, LookAt, PointLight};
+    use umbrage::{Camera, Light, LookAt, PointLight};
 
     /// The scenes have plane and bent surfaces, cut-outs, lamps, and pixels that many triangles fill.
     #[test]

@@ -3,6 +3,7 @@
 //! - [`Tracer`] prepares a scene for ray tracing.
 //! - [`View`] finds the surfaces that a camera sees, and whether light reaches them: the *truth*.
 //!   It traces rays to the light itself and does not use plans.
+//! - [`AreaLight`] is the same for a light with a size, whose shadows are soft.
 //! - [`Reference`] executes a [`Plan`](umbrage::Plan) without adding errors to the plan's own: each
 //!   texel's depth comes from a ray ([`DepthMap`]), and [`umbrage::visibility`] does the lookups.
 //! - [`shade`] turns samples and their visibility into pictures.
@@ -46,11 +47,13 @@
 //! All work is shared by the threads of rayon's current pool. The results do not depend on how many
 //! threads there are.
 
+mod area;
 mod boxes;
 mod check;
 mod error;
 mod filled;
 mod placement;
+mod plane;
 mod reference;
 mod samples;
 pub mod shade;
@@ -58,6 +61,7 @@ mod statistics;
 mod tracer;
 mod triangle;
 
+pub use area::{AreaLight, AreaVisibility};
 pub use error::Error;
 pub use filled::PixelMemory;
 pub use reference::{DepthMap, MapTexel, Reference};

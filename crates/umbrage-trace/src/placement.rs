@@ -1,3 +1,4 @@
+use crate::plane::COMPUTED;
 use crate::{Error, Ray};
 use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
@@ -14,7 +15,7 @@ pub(crate) struct Placement {
     /// Takes directions to mesh space, and also positions relative to the instance's origin.
     pub(crate) mesh_from_world: DMat3,
     /// Upper bound of the factor by which the transform lengthens any vector.
-    stretch: f64,
+    pub(crate) stretch: f64,
 }
 
 impl Placement {
@@ -54,19 +55,14 @@ impl Placement {
         Aabb::around(mesh_bounds.corners().map(|c| self.world_from_mesh.transform_point3(c)))
     }
 
-    /// Upper bound of the distance between `position`, computed on the triangle with these corners,
-    /// and the triangle before its corners were rounded, metres.
-    ///
-    /// Storing a corner in single precision rounds each coordinate by up to 2⁻²⁴ of itself. This
-    /// moves the corner, and with it the triangle, by up to √3·2⁻²⁴ of its largest coordinate. The
-    /// steps in double precision (interpolation, transform and back) add some ten roundings of 2⁻⁵³
-    /// of the mesh's and the world's coordinates. The roundings of mesh coordinates are negligible
-    /// beside 2⁻²⁴; those of world coordinates are not, far from the origin.
+    /// Upper bound of the error of `position`, computed in double precision on the triangle with
+    /// these corners, metres. Interpolation, transform and back are some ten roundings of the mesh's
+    /// and the world's coordinates.
     pub(crate) fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
         let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
         let world =
             position.abs().max_element() + self.world_from_mesh.translation.abs().max_element();
-        largest * self.stretch * 2f64.powi(-23) + world * 2f64.powi(-49)
+        COMPUTED * (largest * self.stretch + world)
     }
 }
 

@@ -112,7 +112,11 @@ fn bytes_per_texel(filter: Filter) -> u32 {
 fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     let beam = map.beam(shadow_coordinates(map, texel))?;
     let ray = Ray { origin: beam.origin, direction: beam.direction };
-    let hit = tracer.closest(ray, [-beam.reach_back, f64::INFINITY])?;
+    let range = [-beam.reach_back, f64::INFINITY];
+    let hit = match map.apex {
+        Some(apex) => tracer.closest_from_lamp(apex + map.origin, ray, range),
+        None => tracer.closest(ray, range),
+    }?;
     let depth = map.project(tracer.position(&hit)).map_or(1.0, |p| p.z);
     Some(depth.clamp(0.0, 1.0) as f32)
 }

@@ -1,4 +1,4 @@
-use crate::{Error, Hit, Progress, Ray, Surface, Tracer};
+use crate::{Error, Hit, PrimitiveRef, Progress, Ray, Surface, Tracer};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -35,7 +35,7 @@ pub struct Sample {
     /// Whether the visible side of the triangle faces the light and lies within the light's reach
     /// (a spot or point light's range, a spot light's cone). If not, the sample is dark whatever
     /// any shadow map says. The geometric normal decides, because triangles are what casts and
-    /// receives shadows.
+    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp does not face it.
     pub is_facing: bool,
 }
 
@@ -131,7 +131,7 @@ impl<'a> View<'a> {
     /// The sample where a ray of the picture hits.
     pub(crate) fn sample_at(&self, hit: &Hit, ray: Ray) -> Sample {
         let surface = self.tracer.surface(hit, ray.direction);
-        let is_facing = is_facing(&self.light, surface.position, surface.geometric_normal);
+        let is_facing = self.is_facing(&surface);
         // The ray's direction has depth 1, so its parameter t is the depth.
         Sample { surface, depth: hit.t, is_facing }
     }
@@ -152,11 +152,26 @@ impl<'a> View<'a> {
             && is_towards
             && end >= 0.0
             && !self.tracer.occluded_from(surface, to_eye, end);
-        is_seen.then(|| Sample {
-            surface: *surface,
-            depth,
-            is_facing: is_facing(&self.light, surface.position, surface.geometric_normal),
-        })
+        is_seen.then(|| Sample { surface: *surface, depth, is_facing: self.is_facing(surface) })
+    }
+
+    fn is_facing(&self, surface: &Surface) -> bool {
+        let Surface { position, geometric_normal: normal, primitive, .. } = *surface;
+        let to_light = self.light.direction_to_light(position);
+        // Whether a plane that holds the lamp faces it would depend on the last bit of each point.
+        let is_edge_on = |lamp| self.tracer.is_edge_on(primitive, lamp);
+        if normal.dot(to_light) <= 0.0 || self.light.position().is_some_and(is_edge_on) {
+            return false;
+        }
+        match self.light {
+            Light::Directional { .. } => true,
+            Light::Spot(spot) => {
+                let axis = spot.direction.normalize_or_zero();
+                spot_depth(&spot, position) <= spot.range
+                    && -axis.dot(to_light) >= spot.half_angle_rad.cos()
+            }
+            Light::Point(point) => position.distance(point.position) <= point.range,
+        }
     }
 
     /// Whether the shadow on a surface counts where pictures are compared: it [faces the
@@ -172,30 +187,34 @@ impl<'a> View<'a> {
     /// included. Samples nearer to the light than its `near` distance are never in shadow, as
     /// documented at [`SpotLight`] and [`PointLight`].
     pub fn truth(&self, sample: &Sample) -> f32 {
-        self.truth_by(sample, |surface, direction, end| {
-            self.tracer.occluded_from(surface, direction, end)
-        })
+        self.truth_among(None, sample)
     }
 
-    /// [`truth`](Self::truth), where `is_occluded` says whether anything lies in a direction from a
-    /// surface, nearer than this many lengths of the direction.
-    pub(crate) fn truth_by(
-        &self,
-        sample: &Sample,
-        is_occluded: impl FnOnce(&Surface, DVec3, f64) -> bool,
-    ) -> f32 {
+    /// [`truth`](Self::truth), if nothing but some triangles can be between the sample and the light.
+    pub(crate) fn truth_among(&self, among: Option<&[PrimitiveRef]>, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
         }
-        let position = sample.surface.position;
-        let (direction, end) = match self.light {
-            Light::Directional { direction } => (-direction, f64::INFINITY),
-            Light::Spot(spot) if spot_depth(&spot, position) < spot.near => return 1.0,
-            Light::Spot(spot) => (spot.position - position, 1.0),
-            Light::Point(point) if cube_depth(&point, position) < point.near => return 1.0,
-            Light::Point(point) => (point.position - position, 1.0),
+        if self.is_too_near(&sample.surface) {
+            return 1.0;
+        }
+        let is_dark = match self.light.position() {
+            Some(lamp) => self.tracer.hidden_among(among, &sample.surface, lamp),
+            None => {
+                let to_sun = self.light.direction_to_light(sample.surface.position);
+                self.tracer.occluded_among(among, &sample.surface, to_sun, f64::INFINITY)
+            }
         };
-        f32::from(u8::from(!is_occluded(&sample.surface, direction, end)))
+        f32::from(u8::from(!is_dark))
+    }
+
+    /// Whether a surface is nearer to a lamp than shadows begin.
+    pub(crate) fn is_too_near(&self, surface: &Surface) -> bool {
+        match self.light {
+            Light::Directional { .. } => false,
+            Light::Spot(spot) => spot_depth(&spot, surface.position) < spot.near,
+            Light::Point(point) => cube_depth(&point, surface.position) < point.near,
+        }
     }
 }
 
@@ -233,22 +252,6 @@ impl Band {
                 row
             })
             .collect()
-    }
-}
-
-fn is_facing(light: &Light, position: DVec3, normal: DVec3) -> bool {
-    let to_light = light.direction_to_light(position);
-    if normal.dot(to_light) <= 0.0 {
-        return false;
-    }
-    match light {
-        Light::Directional { .. } => true,
-        Light::Spot(spot) => {
-            let axis = spot.direction.normalize_or_zero();
-            spot_depth(spot, position) <= spot.range
-                && -axis.dot(to_light) >= spot.half_angle_rad.cos()
-        }
-        Light::Point(point) => position.distance(point.position) <= point.range,
     }
 }
 

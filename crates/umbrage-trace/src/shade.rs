@@ -1,6 +1,6 @@
 //! Turns samples into pictures, lit by a sun and a sky, and into colours that show data.
 
-use crate::{Band, Sample, View};
+use crate::{Band, Sample, Surface, View};
 use glam::{DVec2, DVec3, Vec3};
 use umbrage::{Camera, Light};
 use umbrage_scene::daylight::{GLOW, GROUND_LIGHT, HORIZON, NADIR, SKY_LIGHT, SUN, ZENITH};
@@ -52,14 +52,20 @@ pub fn radiance(light: &Light, sample: &Sample, visibility: f32) -> Vec3 {
     let surface = &sample.surface;
     let normal = surface.shading_normal;
     let to_light = light.direction_to_light(surface.position);
-    let incidence = normal.dot(to_light).max(0.0) as f32;
-    let direct = SUN * (incidence * visibility * attenuation(light, surface.position));
+    let direct =
+        SUN * (incidence(light, surface) * visibility * attenuation(light, surface.position));
     // Sky and ground are brighter on the light's side, so the ambient light is too. Shapes can then
     // be told apart in the shade as well.
     let side = DVec3::new(to_light.x, 0.0, to_light.z);
     let up = (0.5 + 0.5 * normal.y) as f32;
     let ambient = GROUND_LIGHT.lerp(SKY_LIGHT, up) * (1.0 + 0.3 * normal.dot(side) as f32);
     surface.base_color * (direct + ambient)
+}
+
+/// The cosine between a surface's shading normal and the direction to the light, 0 or above: the
+/// factor by which a diffuse surface shows how much light reaches it.
+pub fn incidence(light: &Light, surface: &Surface) -> f32 {
+    surface.shading_normal.dot(light.direction_to_light(surface.position)).max(0.0) as f32
 }
 
 /// The factor by which a spot or point light fades smoothly to nothing at the end of its range: the

@@ -3,6 +3,7 @@ mod beam;
 use crate::boxes::{Boxes, Node};
 use crate::check::check_mesh;
 use crate::placement::{Placement, stretch};
+use crate::plane::{TrianglePlane, normal_of};
 use crate::triangle::{ShearedRay, TriangleHit};
 use crate::{Error, Ray};
 use glam::{DVec3, Vec2, Vec3};
@@ -42,8 +43,8 @@ pub struct Surface {
     /// World space, metres. The position is computed from the triangle's corners, not along the
     /// ray.
     pub position: DVec3,
-    /// Upper bound of the distance between `position` and the surface before rounding, metres: the
-    /// corners are stored in single precision, and every step from them to `position` rounds.
+    /// Upper bound of the error of `position`, metres: every step from the triangle's corners to it
+    /// rounds.
     pub position_error: f64,
     /// The triangle's normal, unit length, world space, turned towards the side that is seen.
     pub geometric_normal: DVec3,
@@ -134,17 +135,12 @@ struct Mask<'a> {
     texture: Option<&'a Texture>,
 }
 
-/// A ray's origin on a surface.
-#[derive(Clone, Copy)]
-struct Departure {
-    from: PrimitiveRef,
-    position_error: f64,
-}
-
-impl Departure {
-    fn of(surface: &Surface) -> Self {
-        Self { from: surface.primitive, position_error: surface.position_error }
-    }
+/// The ends of a ray that surfaces do not hide: see [`Tracer::occluded_from`] and
+/// [`Tracer::hidden_from_lamp`].
+#[derive(Clone, Copy, Default)]
+struct Ends<'a> {
+    departure: Option<&'a Surface>,
+    lamp: Option<DVec3>,
 }
 
 impl<'a> Tracer<'a> {
@@ -273,10 +269,25 @@ impl<'a> Tracer<'a> {
     /// equal t it is the one with the smallest [`PrimitiveRef`]. Rays with coordinates that are not
     /// finite hit nothing.
     pub fn closest(&self, ray: Ray, range: [f64; 2]) -> Option<Hit> {
+        self.first(ray, range, None)
+    }
+
+    /// As [`closest`](Self::closest), for a ray of light from a lamp at this world position. Planes
+    /// that hold the lamp are left out, as by [`hidden_from_lamp`](Self::hidden_from_lamp).
+    pub fn closest_from_lamp(&self, lamp: DVec3, ray: Ray, range: [f64; 2]) -> Option<Hit> {
+        self.first(ray, range, Some(lamp))
+    }
+
+    fn first(&self, ray: Ray, range: [f64; 2], lamp: Option<DVec3>) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         self.visit(ray, range, |primitive, hit| {
             let nearer = best.is_none_or(|b| (hit.t, primitive) < (b.t, b.primitive));
-            if nearer && hit.t >= range[0] && hit.t < range[1] && self.is_there(primitive, hit) {
+            let is_hit = nearer
+                && hit.t >= range[0]
+                && hit.t < range[1]
+                && self.is_there(primitive, hit)
+                && !lamp.is_some_and(|lamp| self.is_edge_on(primitive, lamp));
+            if is_hit {
                 best = Some(Hit { t: hit.t, primitive, barycentrics: hit.weights });
             }
             Some(best.map_or(range[1], |b| b.t))
@@ -286,21 +297,59 @@ impl<'a> Tracer<'a> {
 
     /// Whether anything is hit with `range[0] ≤ t < range[1]`.
     pub fn occluded(&self, ray: Ray, range: [f64; 2]) -> bool {
-        self.any(ray, range, None)
+        self.any(None, ray, range, Ends::default())
     }
 
     /// Whether anything lies in `direction` from a point on a surface, nearer than `end` lengths of
     /// `direction`.
     ///
     /// The surface does not hide itself, although no epsilon is used: the search skips the point's
-    /// own triangle, and every other triangle whose plane the point may lie in, given the errors of
-    /// both. Such triangles are neighbours that share an edge, copies of the triangle, and coplanar
-    /// decals. The tolerance is the sum of both surfaces'
-    /// [`position_error`](Surface::position_error): 2⁻²³ of the corners' coordinates, by which
-    /// storing corners in single precision moves a surface, plus some 2⁻⁴⁹ of the world position.
+    /// own triangle, and every other triangle whose plane the point lies in as far as double
+    /// precision can tell. Such triangles are neighbours at their shared edge and copies of the
+    /// triangle. It also skips triangles that may have been coplanar with the point's own before the
+    /// corners of both were rounded to single precision, such as decals.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
-        let ray = Ray { origin: surface.position, direction };
-        self.any(ray, [0.0, end], Some(Departure::of(surface)))
+        self.occluded_among(None, surface, direction, end)
+    }
+
+    /// [`occluded_from`](Self::occluded_from), by some triangles or by any.
+    pub(crate) fn occluded_among(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        surface: &Surface,
+        direction: DVec3,
+        end: f64,
+    ) -> bool {
+        let ends = Ends { departure: Some(surface), lamp: None };
+        self.any(among, Ray { origin: surface.position, direction }, [0.0, end], ends)
+    }
+
+    /// Whether anything lies between a point on a surface and a lamp, which is a point in world
+    /// space.
+    ///
+    /// The surface does not hide itself, as with [`occluded_from`](Self::occluded_from). A triangle
+    /// whose plane holds the lamp is seen edge-on from it and hides nothing either, such as the
+    /// ceiling that a downlight is flush with. Whether the plane holds the lamp is decided within
+    /// the errors of stored coordinates, so a housing casts however near to the lamp it is.
+    pub fn hidden_from_lamp(&self, surface: &Surface, lamp: DVec3) -> bool {
+        self.hidden_among(None, surface, lamp)
+    }
+
+    /// [`hidden_from_lamp`](Self::hidden_from_lamp), by some triangles or by any.
+    pub(crate) fn hidden_among(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        surface: &Surface,
+        lamp: DVec3,
+    ) -> bool {
+        let ray = Ray { origin: surface.position, direction: lamp - surface.position };
+        self.any(among, ray, [0.0, 1.0], Ends { departure: Some(surface), lamp: Some(lamp) })
+    }
+
+    /// Whether a triangle is seen edge-on from a lamp, because its plane holds the lamp as far as
+    /// rounding can tell.
+    pub fn is_edge_on(&self, primitive: PrimitiveRef, lamp: DVec3) -> bool {
+        self.plane(primitive).holds_lamp(lamp)
     }
 
     /// World position of a hit, metres, computed from the triangle's corners, not along the ray.
@@ -355,45 +404,65 @@ impl<'a> Tracer<'a> {
         corners(mesh, primitive.triangle)
     }
 
-    fn any(&self, ray: Ray, range: [f64; 2], departure: Option<Departure>) -> bool {
+    /// The triangles that a lamp lies in or beside: those [edge-on](Self::is_edge_on) to it whose
+    /// boxes are within a thousandth of the scene's size of it. In single precision such a triangle
+    /// may pass before the lamp, and then seems to hide everything.
+    pub fn edge_on_at(&self, lamp: DVec3) -> Vec<PrimitiveRef> {
+        let reach = self.bounds.size().length() / 1024.0;
+        let mut found = Vec::new();
+        for instance in self.instances.around(lamp, reach) {
+            let placement = &self.placements[instance as usize];
+            let local = placement.mesh_from_world * (lamp - placement.world_from_mesh.translation);
+            let reach = reach * stretch(placement.mesh_from_world);
+            let triangles = self.meshes[placement.mesh].boxes.around(local, reach);
+            let triangles =
+                triangles.into_iter().map(|triangle| PrimitiveRef { instance, triangle });
+            found.extend(triangles.filter(|&primitive| self.is_edge_on(primitive, lamp)));
+        }
+        found.sort_unstable();
+        found
+    }
+
+    fn plane(&self, primitive: PrimitiveRef) -> TrianglePlane<'_> {
+        let placement = &self.placements[primitive.instance as usize];
+        TrianglePlane::new(placement, self.corners(primitive))
+    }
+
+    /// Whether a ray meets any of some triangles, or of all.
+    fn any(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        ray: Ray,
+        range: [f64; 2],
+        ends: Ends<'_>,
+    ) -> bool {
+        let hides = |primitive, hit: &TriangleHit| {
+            hit.t >= range[0]
+                && hit.t < range[1]
+                && !ends.departure.is_some_and(|from| self.is_left_behind(from, primitive))
+                && !ends.lamp.is_some_and(|lamp| self.is_edge_on(primitive, lamp))
+                && self.is_there(primitive, hit)
+        };
+        if let Some(among) = among {
+            return self.hits(among, ray).any(|(primitive, hit)| hides(primitive, &hit));
+        }
         let mut found = false;
         self.visit(ray, range, |primitive, hit| {
-            found = self.hides(primitive, hit, ray, range, departure);
+            found = hides(primitive, hit);
             (!found).then_some(range[1])
         });
         found
     }
 
-    /// Whether a triangle that a ray's line meets counts as in the ray's way.
-    fn hides(
-        &self,
-        primitive: PrimitiveRef,
-        hit: &TriangleHit,
-        ray: Ray,
-        range: [f64; 2],
-        departure: Option<Departure>,
-    ) -> bool {
-        hit.t >= range[0]
-            && hit.t < range[1]
-            && departure.is_none_or(|d| !self.is_left_behind(d, ray.origin, primitive))
-            && self.is_there(primitive, hit)
-    }
-
-    /// Whether the ray started on this very triangle, or in its plane as far as rounding can tell.
-    fn is_left_behind(&self, d: Departure, origin: DVec3, primitive: PrimitiveRef) -> bool {
-        if primitive == d.from {
-            return true;
-        }
-        let placement = &self.placements[primitive.instance as usize];
-        let corners = self.corners(primitive);
-        let local = placement.mesh_from_world * (origin - placement.world_from_mesh.translation);
-        let plane = normal_of(corners);
-        // The product n·(a − o) is the same number in mesh space and in world space. Divided by the
-        // length of the world-space normal, it is the distance from the plane in world space.
-        let world_plane = placement.mesh_from_world.transpose() * plane;
-        let distance = plane.dot(corners[0] - local).abs();
-        let error = d.position_error + placement.position_error(corners, origin);
-        distance <= error * world_plane.length()
+    /// Whether a ray that started on a surface started on this very triangle, or in its plane as far
+    /// as rounding can tell.
+    fn is_left_behind(&self, from: &Surface, primitive: PrimitiveRef) -> bool {
+        let Surface { position, position_error, .. } = *from;
+        let is_in_plane = || {
+            let own = self.plane(from.primitive);
+            self.plane(primitive).holds_point_of(&own, position, position_error)
+        };
+        primitive == from.primitive || is_in_plane()
     }
 
     /// Whether the alpha mask leaves a surface at the hit.
@@ -464,11 +533,6 @@ impl<'a> MeshBoxes<'a> {
 
 fn corners(mesh: &Mesh, triangle: u32) -> [DVec3; 3] {
     mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3())
-}
-
-/// The triangle's normal in mesh space; its length is twice the triangle's area.
-fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a)
 }
 
 fn weigh([a, b, c]: [DVec3; 3], weights: [f64; 3]) -> DVec3 {

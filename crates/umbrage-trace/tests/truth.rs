@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{Random, at, below, camera, ground, nobody, scene, sheet, soup, towards};
+use common::{
+    Random, at, below, camera, false_shadows, ground, nobody, scene, sheet, soup, towards,
+};
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use umbrage::{Light, PointLight, SpotLight};
 use umbrage_scene::closed_form::{
@@ -107,17 +109,6 @@ fn the_shadow_of_a_sphere_is_an_ellipse() {
         assert!(ideal || !is_hidden, "{surface:?} {travel}");
     });
     assert!(dark > 1000 && between < 100, "{dark} {between}");
-}
-
-/// In a picture of surfaces that are all lit, the number of samples that are in shadow, and the
-/// number of all samples.
-fn false_shadows(scene: &Scene, eye: DVec3, target: DVec3, light: Light) -> (usize, usize) {
-    let tracer = Tracer::new(scene).unwrap();
-    let view = View::new(&tracer, camera(eye, target, [160, 120]), light, 1).unwrap();
-    let band = view.band(0..120, &nobody);
-    let truth = band.map(|s| view.truth(s), &nobody);
-    let facing = band.samples().iter().zip(truth).filter(|(s, _)| s.is_some_and(|s| s.is_facing));
-    facing.fold((0, 0), |(wrong, all), (_, lit)| (wrong + usize::from(lit == 0.0), all + 1))
 }
 
 #[test]

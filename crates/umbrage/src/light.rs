@@ -63,6 +63,15 @@ impl Light {
         }
     }
 
+    /// Position of a spot or point light in world space, metres; `None` for a directional light.
+    pub fn position(&self) -> Option<DVec3> {
+        match self {
+            Self::Directional { .. } => None,
+            Self::Spot(spot) => Some(spot.position),
+            Self::Point(point) => Some(point.position),
+        }
+    }
+
     /// The projections that make up the light, each with its own maps: six pyramids for a point
     /// light, one projector for any other light. The light must have been [checked](Self::checked).
     pub(crate) fn projectors(self) -> impl Iterator<Item = (Option<CubeSide>, Projector)> {

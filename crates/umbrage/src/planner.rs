@@ -9,7 +9,7 @@ use crate::plan::{Part, Plan, PlannedLight, ShadowMap};
 use crate::resolution::resolutions;
 use crate::seen::cells::Cells;
 use crate::technique::{Faces, Limits, Technique};
-use crate::visibility::{Filter, LightSize};
+use crate::visibility::Filter;
 use crate::warp::theta;
 use draft::{Draft, Drafting};
 use finish::Finishing;
@@ -353,14 +353,5 @@ impl Planner {
 /// light.
 fn check_light_size(technique: &Technique, light: &Light) -> Result<(), Error> {
     let Filter::Pcss { light: size, .. } = technique.filter else { return Ok(()) };
-    let problem = match (light, size) {
-        (Light::Directional { .. }, LightSize::Metres(_)) => {
-            "a sun's size is an angle, as in light=0.53deg"
-        }
-        (Light::Spot(_) | Light::Point(_), LightSize::Degrees(_)) => {
-            "a lamp's size is a length, as in light=0.2m"
-        }
-        _ => return Ok(()),
-    };
-    Err(Error::invalid("technique.filter.light", problem))
+    size.check_for(light).map_err(|problem| Error::invalid("technique.filter.light", problem))
 }

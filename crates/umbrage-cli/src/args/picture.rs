@@ -2,9 +2,11 @@
 
 use super::technique::{ExecutionArgs, Fit, TexelArgs};
 use super::view::{LightArgs, SceneArgs, ViewArgs};
-use anyhow::{Result, bail};
+use crate::values;
+use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use umbrage::visibility::LightSize;
 use umbrage_lab::NamedTechnique;
 
 /// `umbrage render`.
@@ -31,6 +33,10 @@ pub(crate) struct Render {
     /// Rays along each side of a pixel: K×K samples.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
+    /// Size of the light in the truth: an angle for a sun, as in 0.53deg, or a length for a lamp, as
+    /// in 0.2m. Only for `--aov truth` and `--aov difference`.
+    #[arg(long, value_name = "SIZE", value_parser = values::light_size, allow_hyphen_values = true)]
+    pub(crate) light_size: Option<LightSize>,
     /// What the map is fitted to.
     #[arg(long, value_enum, default_value_t = Fit::Surfaces)]
     pub(crate) fit: Fit,
@@ -69,11 +75,22 @@ pub(crate) enum Aov {
     Minification,
 }
 
+impl Aov {
+    /// Whether the picture shows what ray tracing says.
+    pub(crate) fn shows_truth(self) -> bool {
+        matches!(self, Self::Truth | Self::Difference)
+    }
+}
+
 impl Render {
     pub(super) fn check(&mut self) -> Result<()> {
         self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.options().check()?;
         self.light.options().check()?;
+        ensure!(
+            self.light_size.is_none() || self.aov.shows_truth(),
+            "--light-size: only --aov truth and --aov difference show the truth"
+        );
         self.picture_kind().map(drop)
     }
 

@@ -3,6 +3,7 @@
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
+use umbrage::visibility::LightSize;
 use umbrage_lab::{Backend, ComparisonOptions, NamedTechnique};
 
 /// What `compare` compares if not told.
@@ -40,6 +41,11 @@ pub(crate) struct ComparisonArgs {
     /// comparisons use 1.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
+    /// Size of the light: an angle for a sun, as in 0.53deg, or a length for a lamp, as in 0.2m. The
+    /// soft shadows of a light of this size are then the truth for soft techniques (pcss, and blurs
+    /// in metres); all others are measured against the sharp ones.
+    #[arg(long, value_name = "SIZE", value_parser = values::light_size, allow_hyphen_values = true)]
+    pub(crate) light_size: Option<LightSize>,
 }
 
 /// What shadow maps are fitted to.
@@ -66,7 +72,11 @@ impl From<Fit> for umbrage_lab::Fit {
 impl ComparisonArgs {
     /// What to compare.
     pub(crate) fn options(&self) -> ComparisonOptions {
-        ComparisonOptions { techniques: self.techniques.shadows.clone(), samples: self.samples }
+        ComparisonOptions {
+            techniques: self.techniques.shadows.clone(),
+            samples: self.samples,
+            light_size: self.light_size,
+        }
     }
 }
 

@@ -96,7 +96,7 @@ fn shared_options() {
         ),
         (
             &["--shadows", "lispsm:pcss(light=3)"],
-            "`light=3` must have a unit, as in `light=0.53deg` or `light=0.2m`",
+            "`light=3` must have a unit, as in `0.53deg` or `0.2m`",
         ),
         (&["--shadows", "lispsm:pcss(light=-1m)"], "`light=-1m` must be above 0 and at most"),
         (&["--shadows", "lispsm:pcss(samples=9)"], "from 1 to 8"),

@@ -220,6 +220,7 @@ pub(super) fn check_same(
             (Field::MaxError, s.max_error.map_or("off".to_owned(), |pixels| pixels.to_string())),
             (Field::Size, format!("{}x{}", s.size[0], s.size[1])),
             (Field::Samples, s.samples.to_string()),
+            (Field::LightSize, s.light_size.clone().unwrap_or_else(|| "off".to_owned())),
             (Field::Fit, s.fit.clone()),
             (Field::Opaque, if s.opaque { "on" } else { "off" }.to_owned()),
             (Field::Backend, s.backend.clone()),

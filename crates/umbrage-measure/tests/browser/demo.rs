@@ -228,8 +228,11 @@ impl Compared {
                 maps: 1 + u32::from(name.contains("z2")),
                 texels: 1 << 20,
                 bytes: None,
-                metrics: measure(truth.visibility, visibility, counted).unwrap(),
+                truth: None,
+                metrics: measure(truth.visibility, visibility, counted, &color.map(|_| 1.0))
+                    .unwrap(),
                 error_px: measure_error_px(error_px, counted).unwrap(),
+                perspective_px: measure_error_px(error_px, counted).unwrap(),
                 // One figure is unknown and must be distinguished from zero.
                 casters_culled: Some(0.1 * (i % 5) as f64),
                 flicker: None,
@@ -259,7 +262,7 @@ impl Compared {
                 name: None,
                 direction: unit(SUN_TRAVELS).map(f64::from),
             },
-            truth: Truth { rays_per_pixel: 16, seconds: Some(12.34) },
+            truth: Truth { rays_per_pixel: 16, seconds: Some(12.34), area: None },
             motion: None,
             results,
         };

@@ -383,6 +383,7 @@ fn a_sweeps_page_leads_to_its_views() {
             max_error: Some(1.5),
             size: [160, 90],
             samples: 4,
+            light_size: None,
             fit: "box".to_owned(),
             opaque: true,
             backend: "reference".to_owned(),

@@ -4,7 +4,7 @@
 //! triangles once, and each of its rays is then tested against them alone. The hits are the same to
 //! the last bit as those of rays that search by themselves.
 
-use super::{Departure, Hit, PrimitiveRef, Surface, Tracer, corners};
+use super::{Hit, PrimitiveRef, Tracer, corners};
 use crate::Ray;
 use crate::boxes::Boxes;
 use crate::triangle::{ShearedRay, TriangleHit};
@@ -161,20 +161,6 @@ impl Tracer<'_> {
         hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
     }
 
-    /// [`occluded_from`](Self::occluded_from) by some triangles.
-    pub(crate) fn occluded_among(
-        &self,
-        triangles: &[PrimitiveRef],
-        surface: &Surface,
-        direction: DVec3,
-        end: f64,
-    ) -> bool {
-        let ray = Ray { origin: surface.position, direction };
-        let departure = Some(Departure::of(surface));
-        let mut hits = self.hits(triangles, ray);
-        hits.any(|(primitive, hit)| self.hides(primitive, &hit, ray, [0.0, end], departure))
-    }
-
     /// Whether a triangle has surface everywhere between its corners.
     pub(crate) fn is_solid(&self, primitive: PrimitiveRef) -> bool {
         let mesh = self.placements[primitive.instance as usize].mesh;
@@ -182,7 +168,7 @@ impl Tracer<'_> {
     }
 
     /// Where a ray's line meets these triangles.
-    fn hits(
+    pub(super) fn hits(
         &self,
         triangles: &[PrimitiveRef],
         ray: Ray,

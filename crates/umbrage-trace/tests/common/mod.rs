@@ -6,7 +6,7 @@ use umbrage::{
     Bounds, Camera, Light, LookAt, MapError, Part, Plan, Planner, Rows, ShadowMap, Technique,
 };
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Scene};
-use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer};
+use umbrage_trace::{PrimitiveRef, Ray, Surface, Tracer, View};
 
 pub(crate) fn nobody(_rows: u64) {}
 
@@ -141,6 +141,22 @@ pub(crate) fn even_map(
         apex: None,
         slab: umbrage::Slab::default(),
     }
+}
+
+/// In a picture of surfaces that are all lit, the number of samples that are in shadow, and the
+/// number of all samples.
+pub(crate) fn false_shadows(
+    scene: &Scene,
+    eye: DVec3,
+    target: DVec3,
+    light: Light,
+) -> (usize, usize) {
+    let tracer = Tracer::new(scene).unwrap();
+    let view = View::new(&tracer, camera(eye, target, [160, 120]), light, 1).unwrap();
+    let band = view.band(0..120, &nobody);
+    let truth = band.map(|s| view.truth(s), &nobody);
+    let facing = band.samples().iter().zip(truth).filter(|(s, _)| s.is_some_and(|s| s.is_facing));
+    facing.fold((0, 0), |(wrong, all), (_, lit)| (wrong + usize::from(lit == 0.0), all + 1))
 }
 
 /// The surface straight below `point`.

@@ -317,18 +317,23 @@ fn read_blur(written: &Written<'_>) -> Result<Option<Blur>, ParseError> {
 }
 
 fn read_light(text: &str) -> Result<LightSize, ParseError> {
-    let number = |digits: &str, most: f32| {
-        let size = digits.parse().ok().filter(|size: &f32| *size > 0.0 && *size <= most);
-        let problem =
-            || ParseError::new(format!("`light={text}` must be above 0 and at most {most}"));
-        size.ok_or_else(problem)
-    };
-    match (text.strip_suffix("deg"), text.strip_suffix('m')) {
-        (Some(degrees), _) => number(degrees, LightSize::MAX_DEGREES).map(LightSize::Degrees),
-        (_, Some(metres)) => number(metres, LightSize::MAX_METRES).map(LightSize::Metres),
-        _ => Err(ParseError::new(format!(
-            "`light={text}` must have a unit, as in `light=0.53deg` or `light=0.2m`"
-        ))),
+    text.parse().map_err(|e: ParseError| ParseError::new(format!("`light={text}` {}", e.problem)))
+}
+
+/// Reads the form that it is printed in: `0.53deg`, `0.2m`.
+impl FromStr for LightSize {
+    type Err = ParseError;
+
+    fn from_str(text: &str) -> Result<Self, ParseError> {
+        let number = |digits: &str, most: f32| {
+            let size = digits.parse().ok().filter(|size: &f32| *size > 0.0 && *size <= most);
+            size.ok_or_else(|| ParseError::new(format!("must be above 0 and at most {most}")))
+        };
+        match (text.strip_suffix("deg"), text.strip_suffix('m')) {
+            (Some(degrees), _) => number(degrees, Self::MAX_DEGREES).map(Self::Degrees),
+            (_, Some(metres)) => number(metres, Self::MAX_METRES).map(Self::Metres),
+            _ => Err(ParseError::new("must have a unit, as in `0.53deg` or `0.2m`")),
+        }
     }
 }
 

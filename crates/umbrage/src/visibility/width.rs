@@ -1,4 +1,5 @@
 use crate::error::{Error, check};
+use crate::light::Light;
 use crate::plan::Receiver;
 use std::fmt;
 
@@ -78,14 +79,35 @@ impl LightSize {
         }
     }
 
-    pub(crate) fn check(self) -> Result<(), Error> {
+    /// Checks that the size is in range and in the unit of this kind of light.
+    ///
+    /// # Errors
+    /// A text that says what is wrong with the size and what would be right.
+    pub fn check_for(self, light: &Light) -> Result<(), String> {
+        let problem = match (light, self) {
+            (Light::Directional { .. }, Self::Metres(_)) => {
+                "a sun's size is an angle, as in 0.53deg"
+            }
+            (Light::Spot(_) | Light::Point(_), Self::Degrees(_)) => {
+                "a lamp's size is a length, as in 0.2m"
+            }
+            _ => return self.check_range(),
+        };
+        Err(problem.to_owned())
+    }
+
+    fn check_range(self) -> Result<(), String> {
         let (size, max, unit) = match self {
             Self::Degrees(size) => (size, Self::MAX_DEGREES, "degrees"),
             Self::Metres(size) => (size, Self::MAX_METRES, "metres"),
         };
-        check(size > 0.0 && size <= max, "filter.light", || {
-            format!("must be above 0 and at most {max} {unit}, is {size}")
-        })
+        let is_valid = size > 0.0 && size <= max;
+        let problem = || format!("must be above 0 and at most {max} {unit}, is {size}");
+        is_valid.then_some(()).ok_or_else(problem)
+    }
+
+    pub(crate) fn check(self) -> Result<(), Error> {
+        self.check_range().map_err(|problem| Error::invalid("filter.light", problem))
     }
 }
 
