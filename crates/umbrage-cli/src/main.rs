@@ -38,6 +38,7 @@ fn main() -> ExitCode {
         }
     };
     start_log(verbose);
+    stop_without_traces();
     // Log lines would break a progress bar.
     let quiet = verbose > 0;
     finish(match &command {
@@ -72,6 +73,17 @@ fn keep_drivers_quiet() {
 
 #[cfg(not(target_os = "linux"))]
 fn keep_drivers_quiet() {}
+
+/// The exit code that shells expect from a program that was interrupted.
+const INTERRUPTED: i32 = 130;
+
+/// Sees to it that an interrupted or terminated program removes its unfinished files.
+fn stop_without_traces() {
+    let stop = || umbrage_measure::exit_without_traces(INTERRUPTED);
+    if let Err(e) = ctrlc::set_handler(stop) {
+        log::warn!("unfinished files stay if this program is stopped: {e}");
+    }
+}
 
 fn finish(result: anyhow::Result<()>) -> ExitCode {
     match result {

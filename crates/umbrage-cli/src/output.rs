@@ -71,7 +71,7 @@ pub(crate) fn one_line(error: &Error) -> String {
         Some(error) => umbrage_lab::Error::in_words(error, &option),
         None => cause.to_string(),
     };
-    let text = error.chain().map(told).collect::<Vec<_>>().join(": ");
+    let text = umbrage_lab::joined(error.chain().map(told));
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

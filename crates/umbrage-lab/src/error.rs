@@ -294,8 +294,18 @@ impl From<umbrage_measure::Error> for Error {
 
 /// Returns the message of an error, followed by those of its causes.
 pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |e| e.source());
-    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+    let chain = std::iter::successors(Some(error), |e| e.source());
+    joined(chain.map(|e| e.to_string()))
+}
+
+/// Joins the messages of an error and its causes. Some errors tell their cause themselves, which is
+/// then not told again.
+pub fn joined(messages: impl IntoIterator<Item = String>) -> String {
+    messages.into_iter().fold(String::new(), |text, message| match text.is_empty() {
+        true => message,
+        false if text.ends_with(&message) => text,
+        false => format!("{text}: {message}"),
+    })
 }
 
 /// Converts errors of other crates into errors about a field.
@@ -331,6 +341,18 @@ impl<T, E: std::error::Error> About<T> for Result<T, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Some errors of these kinds tell their cause, and some leave it to whoever shows them.
+    #[test]
+    fn causes_are_told_once() {
+        let cause = || std::io::Error::other("disk full");
+        let measure = umbrage_measure::Error::Write { path: "a.png".into(), source: cause() };
+        assert_eq!(Error::from(measure).to_string(), "cannot write a.png: disk full");
+        let scene = SceneError::Read { path: "a.glb".into(), source: cause() };
+        assert_eq!(Error::from(scene).to_string(), "a.glb: disk full");
+        let messages = ["top", "why: root", "root"].map(str::to_owned);
+        assert_eq!(joined(messages), "top: why: root");
+    }
 
     #[test]
     fn whoever_asks_has_his_own_words() {

@@ -1,11 +1,9 @@
 //! Files and folders that are written whole or not at all.
 
 use crate::error::{About, Error, Field};
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
-
-/// Prefix of the names of unfinished files and folders.
-pub(crate) const TEMPORARY: &str = ".umbrage-";
+use umbrage_measure::{TemporaryFolder, remove_abandoned};
 
 /// File that records what a view of a sweep was made from, beside the view's report if it has one.
 pub(crate) const VIEW_RECORD: &str = "view.json";
@@ -41,35 +39,15 @@ pub fn check_file(path: &Path) -> Result<(), Error> {
     if path.is_dir() {
         return wrong(format!("{} is a folder, must be a file", path.display()));
     }
-    Staging::new(&parent).map(drop)
+    staging(&parent).map(drop)
 }
 
-/// A temporary folder beside the destination, in which files are written before they are moved into
-/// place. Dropping it removes the folder with all its contents.
-struct Staging {
-    path: PathBuf,
-}
-
-impl Staging {
-    /// Makes an empty temporary folder in `parent`.
-    fn new(parent: &Path) -> Result<Self, Error> {
-        for attempt in 0..1000 {
-            let path = parent.join(format!("{TEMPORARY}{}-{attempt}", std::process::id()));
-            match std::fs::create_dir(&path) {
-                Ok(()) => return Ok(Self { path }),
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(e) => return wrong(format!("cannot write in {}: {e}", parent.display())),
-            }
-        }
-        wrong(format!("{} is full of unfinished work of other runs", parent.display()))
-    }
-}
-
-impl Drop for Staging {
-    fn drop(&mut self) {
-        // A temporary folder that cannot be removed is no reason to fail.
-        let _ = std::fs::remove_dir_all(&self.path);
-    }
+/// Makes an empty temporary folder in `parent`, in which files are written before they are moved
+/// into place, and removes what killed processes left there.
+fn staging(parent: &Path) -> Result<TemporaryFolder, Error> {
+    remove_abandoned(parent);
+    TemporaryFolder::new_in(parent)
+        .about_trying(Field::Output, || format!("cannot write in {}", parent.display()))
 }
 
 /// Contents of a report's folder, by which a former report is told from files that somebody needs.
@@ -112,7 +90,7 @@ impl ReportFolder {
     /// An error if the folder holds something else, or if it cannot be written.
     pub fn check(target: &Path, contents: Contents) -> Result<Self, Error> {
         let parent = existing_parent(target)?;
-        Staging::new(&parent)?;
+        staging(&parent)?;
         let folder = Self { target: target.to_owned(), parent, contents };
         folder.check_replaceable()?;
         Ok(folder)
@@ -153,28 +131,14 @@ impl ReportFolder {
         &self,
         write: impl FnOnce(&Path) -> Result<T, E>,
     ) -> Result<T, E> {
-        let new = Staging::new(&self.parent)?;
-        let report = new.path.join("new");
+        let new = staging(&self.parent)?;
+        let report = new.path().join("new");
         std::fs::create_dir(&report).about(Field::Output)?;
         let written = write(&report)?;
         // Somebody may have put files there in the meantime.
         self.check_replaceable()?;
-        let former = new.path.join("former");
-        let has_former = self.target.exists();
-        let swap = || {
-            if has_former {
-                std::fs::rename(&self.target, &former)?;
-            }
-            std::fs::rename(&report, &self.target).inspect_err(|_| {
-                if has_former {
-                    // The former report is better than none. If this fails too, the first error is
-                    // returned.
-                    let _ = std::fs::rename(&former, &self.target);
-                }
-            })
-        };
         let tried = || format!("cannot write {}", self.target.display());
-        swap().about_trying(Field::Output, tried)?;
+        new.put(&report, &self.target).about_trying(Field::Output, tried)?;
         Ok(written)
     }
 }

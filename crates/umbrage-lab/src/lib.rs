@@ -74,7 +74,7 @@ pub use bencher::{Bencher, Costs};
 pub use casters::{MapCasters, casters, casters_culled};
 pub use comparison::{Compared, Comparison, ComparisonOptions};
 pub use defaults::Defaults;
-pub use error::{Difference, Error, Field};
+pub use error::{Difference, Error, Field, joined};
 pub use executor::{Executor, RenderScene};
 pub use executors::{Backend, Executors};
 pub use folder::{Contents, ReportFolder, check_file};

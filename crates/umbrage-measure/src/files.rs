@@ -1,5 +1,6 @@
 //! Writes files completely or not at all.
 
+use crate::temporary::write_whole;
 use crate::{Error, Image, Rgb};
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -16,23 +17,11 @@ use std::path::Path;
 pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
     let path = path.as_ref();
     let is_device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".umbrage-");
-    // Temporary files can only be read by their owner; this one gets the permissions of ordinary
-    // files.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let write = || {
-        if is_device {
-            return std::fs::write(path, bytes);
-        }
-        let mut file = builder.tempfile_in(folder)?;
-        file.write_all(bytes)?;
-        file.persist(path).map_err(|e| e.error)?;
-        Ok(())
+    let written = match is_device {
+        true => std::fs::write(path, bytes),
+        false => write_whole(path, |file| file.write_all(bytes)),
     };
-    write().map_err(|source| Error::Write { path: path.to_owned(), source })
+    written.map_err(|source| Error::Write { path: path.to_owned(), source })
 }
 
 /// A type of pixel that PNG files can store.

@@ -25,6 +25,7 @@ mod page;
 mod pictures;
 mod report;
 mod sweep;
+mod temporary;
 
 pub use color::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS};
 pub use error::Error;
@@ -38,3 +39,4 @@ pub use page::{
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
 pub use report::{AreaTruth, LightInfo, Measured, Motion, Report, Times, Truth, TruthKind, View};
 pub use sweep::{Mean, Sweep, SweepSettings, SweptView};
+pub use temporary::{TEMPORARY, TemporaryFolder, exit_without_traces, remove_abandoned};

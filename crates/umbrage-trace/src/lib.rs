@@ -51,6 +51,7 @@ mod area;
 mod boxes;
 mod check;
 mod error;
+mod filled;
 mod placement;
 mod plane;
 mod reference;
@@ -62,6 +63,7 @@ mod triangle;
 
 pub use area::{AreaLight, AreaVisibility};
 pub use error::Error;
+pub use filled::PixelMemory;
 pub use reference::{DepthMap, MapTexel, Reference};
 pub use samples::{Band, Sample, View};
 pub use tracer::{Hit, PrimitiveRef, Surface, Tracer};
@@ -86,6 +88,11 @@ impl Ray {
     pub fn of_view(camera: &Camera, pixel: DVec2) -> Self {
         let sight = camera.ray(pixel);
         Self { origin: camera.eye() + sight.start, direction: sight.direction }
+    }
+
+    /// The point at a parameter, world space.
+    pub(crate) fn at(self, t: f64) -> DVec3 {
+        self.origin + t * self.direction
     }
 }
 

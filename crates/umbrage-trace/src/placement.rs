@@ -1,5 +1,5 @@
-use crate::Error;
 use crate::plane::COMPUTED;
+use crate::{Error, Ray};
 use glam::{DAffine3, DMat3, DVec3};
 use umbrage::Aabb;
 use umbrage_scene::{Role, Scene};
@@ -40,6 +40,14 @@ impl Placement {
         let stretch = stretch(world_from_mesh.matrix3);
         let role = scene.roles.of(index);
         Ok(Self { mesh: instance.mesh, role, world_from_mesh, mesh_from_world, stretch })
+    }
+
+    /// A ray of world space in mesh space, with the same parameter along it.
+    pub(crate) fn ray_in_mesh(&self, ray: Ray) -> Ray {
+        Ray {
+            origin: self.mesh_from_world * (ray.origin - self.world_from_mesh.translation),
+            direction: self.mesh_from_world * ray.direction,
+        }
     }
 
     pub(crate) fn bounds(&self, mesh_bounds: Aabb) -> Aabb {

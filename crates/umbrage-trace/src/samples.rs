@@ -1,4 +1,4 @@
-use crate::{Error, Progress, Ray, Surface, Tracer};
+use crate::{Error, Hit, PrimitiveRef, Progress, Ray, Surface, Tracer};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -104,22 +104,36 @@ impl<'a> View<'a> {
 
     fn pixel(&self, x: u32, y: u32) -> impl Iterator<Item = Option<Sample>> {
         let grid = self.grid;
-        (0..grid * grid).map(move |i| {
-            let within = DVec2::new(f64::from(i % grid) + 0.5, f64::from(i / grid) + 0.5);
-            self.sample(DVec2::new(f64::from(x), f64::from(y)) + within / f64::from(grid))
-        })
+        (0..grid * grid).map(move |i| self.sample(self.point(x, y, i)))
+    }
+
+    /// The point of the picture, in pixels, at which the sample of this index in a pixel is taken.
+    pub(crate) fn point(&self, x: u32, y: u32, index: u32) -> DVec2 {
+        let grid = self.grid;
+        let within = DVec2::new(f64::from(index % grid) + 0.5, f64::from(index / grid) + 0.5);
+        DVec2::new(f64::from(x), f64::from(y)) + within / f64::from(grid)
     }
 
     /// The surface seen at a point of the picture, given in pixels as for [`Camera::ray`]; `None`
     /// where the sky shows. Surfaces nearer than the camera's near distance are not seen. Surfaces
     /// beyond its far distance are seen, but no shadow map serves them.
     pub fn sample(&self, pixel: DVec2) -> Option<Sample> {
-        let ray = Ray::of_view(&self.camera, pixel);
+        let ray = self.ray(pixel);
         let hit = self.tracer.closest(ray, [self.camera.near(), f64::INFINITY])?;
-        let surface = self.tracer.surface(&hit, ray.direction);
+        Some(self.sample_at(&hit, ray))
+    }
+
+    /// The ray through a point of the picture. Its parameter t is the depth.
+    pub(crate) fn ray(&self, pixel: DVec2) -> Ray {
+        Ray::of_view(&self.camera, pixel)
+    }
+
+    /// The sample where a ray of the picture hits.
+    pub(crate) fn sample_at(&self, hit: &Hit, ray: Ray) -> Sample {
+        let surface = self.tracer.surface(hit, ray.direction);
         let is_facing = self.is_facing(&surface);
         // The ray's parameter t is the depth.
-        Some(Sample { surface, depth: hit.t, is_facing })
+        Sample { surface, depth: hit.t, is_facing }
     }
 
     /// The sample that this view has at a point which another view saw. `None` if the point lies
@@ -165,6 +179,11 @@ impl<'a> View<'a> {
     /// included. Samples nearer to the light than its `near` distance are never in shadow, as
     /// documented at [`SpotLight`](umbrage::SpotLight) and [`PointLight`](umbrage::PointLight).
     pub fn truth(&self, sample: &Sample) -> f32 {
+        self.truth_among(None, sample)
+    }
+
+    /// [`truth`](Self::truth), if nothing but some triangles can be between the sample and the light.
+    pub(crate) fn truth_among(&self, among: Option<&[PrimitiveRef]>, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
         }
@@ -172,10 +191,10 @@ impl<'a> View<'a> {
             return 1.0;
         }
         let is_dark = match self.light.position() {
-            Some(lamp) => self.tracer.hidden_from_lamp(&sample.surface, lamp),
+            Some(lamp) => self.tracer.hidden_among(among, &sample.surface, lamp),
             None => {
                 let to_sun = self.light.direction_to_light(sample.surface.position);
-                self.tracer.occluded_from(&sample.surface, to_sun, f64::INFINITY)
+                self.tracer.occluded_among(among, &sample.surface, to_sun, f64::INFINITY)
             }
         };
         f32::from(u8::from(!is_dark))

@@ -1,3 +1,5 @@
+mod beam;
+
 use crate::boxes::{Boxes, Node};
 use crate::check::check_mesh;
 use crate::placement::{Placement, stretch};
@@ -10,6 +12,8 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use umbrage::Aabb;
 use umbrage_scene::{Alpha, Material, Mesh, Role, Scene, Texture};
+
+pub(crate) use beam::{Beam, End};
 
 /// One triangle of one instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -144,9 +148,9 @@ struct Ends<'a> {
 }
 
 /// Which instances a ray may meet.
-type Wanted = fn(Role) -> bool;
-const IS_SEEN: Wanted = |role| role.is_seen;
-const CASTS: Wanted = |role| role.casts;
+pub(crate) type Wanted = fn(Role) -> bool;
+pub(crate) const IS_SEEN: Wanted = |role| role.is_seen;
+pub(crate) const CASTS: Wanted = |role| role.casts;
 
 impl Surface {
     fn ray(&self, direction: DVec3) -> Ray {
@@ -328,7 +332,7 @@ impl<'a> Tracer<'a> {
 
     /// Whether anything that casts shadows is hit with `range[0] ≤ t < range[1]`.
     pub fn occluded(&self, ray: Ray, range: [f64; 2]) -> bool {
-        self.any(ray, range, Ends::default(), CASTS)
+        self.any(None, ray, range, Ends::default(), CASTS)
     }
 
     /// Whether anything that casts shadows lies in `direction` from a point on a surface, nearer than
@@ -340,15 +344,26 @@ impl<'a> Tracer<'a> {
     /// triangle. It also skips triangles that may have been coplanar with the point's own before the
     /// corners of both were rounded to single precision, such as decals.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
+        self.occluded_among(None, surface, direction, end)
+    }
+
+    /// [`occluded_from`](Self::occluded_from), by some triangles or by any.
+    pub(crate) fn occluded_among(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        surface: &Surface,
+        direction: DVec3,
+        end: f64,
+    ) -> bool {
         let ends = Ends { departure: Some(surface), lamp: None };
-        self.any(surface.ray(direction), [0.0, end], ends, CASTS)
+        self.any(among, surface.ray(direction), [0.0, end], ends, CASTS)
     }
 
     /// As [`occluded_from`](Self::occluded_from), but for what is seen in place of what casts
     /// shadows.
     pub(crate) fn hidden_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
         let ends = Ends { departure: Some(surface), lamp: None };
-        self.any(surface.ray(direction), [0.0, end], ends, IS_SEEN)
+        self.any(None, surface.ray(direction), [0.0, end], ends, IS_SEEN)
     }
 
     /// Whether anything that casts shadows lies between a point on a surface and a lamp, which is a
@@ -359,8 +374,18 @@ impl<'a> Tracer<'a> {
     /// ceiling that a downlight is flush with. Whether the plane holds the lamp is decided within
     /// the errors of stored coordinates, so a housing casts however near to the lamp it is.
     pub fn hidden_from_lamp(&self, surface: &Surface, lamp: DVec3) -> bool {
+        self.hidden_among(None, surface, lamp)
+    }
+
+    /// [`hidden_from_lamp`](Self::hidden_from_lamp), by some triangles or by any.
+    pub(crate) fn hidden_among(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        surface: &Surface,
+        lamp: DVec3,
+    ) -> bool {
         let ends = Ends { departure: Some(surface), lamp: Some(lamp) };
-        self.any(surface.ray(lamp - surface.position), [0.0, 1.0], ends, CASTS)
+        self.any(among, surface.ray(lamp - surface.position), [0.0, 1.0], ends, CASTS)
     }
 
     /// Whether a triangle is seen edge-on from a lamp, because its plane holds the lamp as far as
@@ -445,14 +470,28 @@ impl<'a> Tracer<'a> {
         TrianglePlane::new(placement, self.corners(primitive))
     }
 
-    fn any(&self, ray: Ray, range: [f64; 2], ends: Ends<'_>, is_wanted: Wanted) -> bool {
-        let mut found = false;
-        self.visit(ray, range, is_wanted, |primitive, hit| {
-            found = hit.t >= range[0]
+    /// Whether a ray meets any of some triangles, all of which are wanted, or any of all that are.
+    fn any(
+        &self,
+        among: Option<&[PrimitiveRef]>,
+        ray: Ray,
+        range: [f64; 2],
+        ends: Ends<'_>,
+        is_wanted: Wanted,
+    ) -> bool {
+        let hides = |primitive, hit: &TriangleHit| {
+            hit.t >= range[0]
                 && hit.t < range[1]
                 && !ends.departure.is_some_and(|from| self.is_left_behind(from, primitive))
                 && !ends.lamp.is_some_and(|lamp| self.is_edge_on(primitive, lamp))
-                && self.is_there(primitive, hit);
+                && self.is_there(primitive, hit)
+        };
+        if let Some(among) = among {
+            return self.hits(among, ray).any(|(primitive, hit)| hides(primitive, &hit));
+        }
+        let mut found = false;
+        self.visit(ray, range, is_wanted, |primitive, hit| {
+            found = hides(primitive, hit);
             (!found).then_some(range[1])
         });
         found
@@ -504,11 +543,7 @@ impl<'a> Tracer<'a> {
                 return Some(end);
             }
             let mesh = &self.scene.meshes[placement.mesh];
-            let local = Ray {
-                origin: placement.mesh_from_world
-                    * (ray.origin - placement.world_from_mesh.translation),
-                direction: placement.mesh_from_world * ray.direction,
-            };
+            let local = placement.ray_in_mesh(ray);
             let sheared = ShearedRay::new(local);
             let mut stopped = false;
             self.meshes[placement.mesh].boxes.visit(local, [range[0], end], |triangle| {

@@ -245,6 +245,9 @@ fn what_changed_is_done_again_and_nothing_else() {
     assert_eq!(redone(&views), ["b"]);
     std::fs::write(desk.path("points.bin"), points(-7.0)).unwrap();
     assert_eq!(redone(&views), ["stage"]);
+    // A report without one of its pictures is not whole.
+    std::fs::remove_file(desk.path("out/views/b/01-uniform-32-visibility.png")).unwrap();
+    assert_eq!(redone(&views), ["b"]);
     // What an older program made is no result of this one.
     let mut record = json_of(&desk, "out/views/a/view.json");
     record["inputs"]["version"] = json!("0.0.1");
@@ -570,6 +573,47 @@ fn two_at_once_are_refused_and_the_dead_cleared_away() {
     desk.succeed(&small("out", &[]));
     assert_eq!(listing(&desk.path("out/views")), ["a"]);
     assert!(!desk.path("out/.umbrage-x").exists());
+}
+
+/// Whoever works in a folder removes what killed processes left there, and nothing else.
+#[test]
+fn what_the_killed_left_beside_the_output_is_removed() {
+    let desk = Desk::new();
+    for path in [".umbrage-dead/new/index.html", ".umbrage-half"] {
+        std::fs::create_dir_all(desk.path(path).parent().unwrap()).unwrap();
+        desk.write(path, "half");
+    }
+    desk.write(".umbrage-alive", "half");
+    let alive = std::fs::File::open(desk.path(".umbrage-alive")).unwrap();
+    alive.lock().unwrap();
+    desk.succeed(&["render", "pole", "-o", "a.png", "--size", "8x8", "--shadows", "uniform@32"]);
+    assert_eq!(desk.listing(), [".umbrage-alive", "a.png"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn whoever_is_told_to_stop_leaves_nothing_unfinished() {
+    let desk = Desk::new();
+    let views: Vec<Value> =
+        (0..8).map(|i| view(&format!("v{i}"), "pole", [1.0, -1.0, 0.1 * f64::from(i)])).collect();
+    write_views(&desk, "views.json", &views);
+    let hidden = |folder: &Path| -> Vec<String> {
+        let names = if folder.is_dir() { listing(folder) } else { Vec::new() };
+        names.into_iter().filter(|name| name.starts_with(".umbrage-")).collect()
+    };
+    let (out, folder) = (desk.path("out"), desk.path("out/views"));
+    for signal in ["INT", "TERM"] {
+        let size = ["sweep", "views.json", "-o", "out", "--size", "160x90"];
+        let mut command = desk.command(&[&size[..], &SMALL[2..]].concat());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        while hidden(&folder).is_empty() && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        let kill = ["-s", signal, &child.id().to_string()];
+        assert!(std::process::Command::new("kill").args(kill).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
+        assert_eq!([hidden(&out), hidden(&folder)], [Vec::<String>::new(), vec![]], "{signal}");
+    }
 }
 
 /// Any values in any place are answered, never with a panic.

@@ -4,14 +4,12 @@ use super::frames::{Frame, Motion, MovingView, executors};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::technique::NamedTechnique;
+use rayon::prelude::*;
 use std::ops::Range;
-use umbrage_trace::{Sample, View};
+use umbrage_trace::{PixelMemory, Sample, View};
 
 /// Rays along each side of a pixel that determine its true visibility.
 const TRUTH_SAMPLES: u32 = 8;
-
-/// Surfaces count as one if the cosine of the angle between their normals is above this value.
-const SAME_PLANE: f64 = 0.99;
 
 /// The temporal noise of a technique, which shows as sparkling pixels.
 #[derive(Clone, Debug)]
@@ -50,7 +48,7 @@ pub fn noise(
             executor.render(plan, &|_| {})?;
         }
         let centers = View::new(scene.tracer(), *view.camera(), *view.light(), 1)?;
-        for rows in view.bands() {
+        for rows in centers.bands() {
             let ideal = ideal(view, &centers, rows, &|n| progress.advance(n));
             let samples: Vec<&Sample> = ideal.iter().map(|pixel| &pixel.sample).collect();
             for (executor, trail) in executors.iter_mut().zip(&mut trails) {
@@ -79,30 +77,22 @@ fn ideal(
     rows: Range<u32>,
     progress: umbrage_trace::Progress<'_>,
 ) -> Vec<Ideal> {
-    let counts =
-        |s: &Option<Sample>| s.as_ref().filter(|s| view.counts(s.is_facing, s.depth)).copied();
-    let first = rows.start as usize * view.camera().image()[0] as usize;
-    let band = view.band(rows.clone(), progress);
-    let truth = band.map(|s| view.truth(s), &|_| {});
-    let n = band.samples_per_pixel();
-    let pixels = band.samples().chunks(n).zip(truth.chunks(n));
-    let middles = centers.band(rows, &|_| {});
-    pixels
-        .zip(middles.samples())
-        .enumerate()
-        .filter_map(|(i, ((samples, truth), middle))| {
-            let sample = counts(middle)?;
-            let plane = |s: Sample| s.surface.geometric_normal;
-            let is_full = samples
-                .iter()
-                .all(|s| counts(s).is_some_and(|s| plane(s).dot(plane(sample)) > SAME_PLANE));
-            if !is_full {
-                return None;
-            }
-            let truth = truth.iter().sum::<f32>() / n as f32;
-            Some(Ideal { index: first + i, truth, sample })
-        })
-        .collect()
+    let width = view.camera().image()[0];
+    let middles = centers.band(rows.clone(), &|_| {});
+    let ideal = |row: (u32, &[Option<Sample>])| {
+        let (y, middles) = row;
+        let mut memory = PixelMemory::default();
+        let pixels = (0..width).zip(middles).filter_map(|(x, middle)| {
+            let sample = middle.filter(|s| view.counts(s.is_facing, s.depth))?;
+            let truth = view.truth_of_filled([x, y], &sample, &mut memory)?;
+            Some(Ideal { index: (y * width + x) as usize, truth, sample })
+        });
+        let pixels: Vec<Ideal> = pixels.collect();
+        progress(1);
+        pixels
+    };
+    let rows = rows.into_par_iter().zip(middles.samples().par_chunks(width as usize));
+    rows.flat_map_iter(ideal).collect()
 }
 
 /// The errors of a technique's pixels in the present and the last frame, and their changes so far.

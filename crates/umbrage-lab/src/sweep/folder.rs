@@ -12,12 +12,12 @@
 
 use super::views::SweepView;
 use crate::error::{About, Difference, Error, Field};
-use crate::folder::{Contents, ReportFolder, TEMPORARY, VIEW_RECORD, existing_parent, names_in};
+use crate::folder::{Contents, ReportFolder, VIEW_RECORD, existing_parent, names_in};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use umbrage_measure::{Report, SweepSettings, write_file};
+use umbrage_measure::{Report, SweepSettings, TEMPORARY, write_file};
 
 /// Version of the program. Results of another version are not valid for this one.
 pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -46,6 +46,8 @@ struct Record {
     inputs: Inputs,
     /// Why the view failed; `None` if there is a report.
     error: Option<String>,
+    /// Names of the report's files, without all of which it counts as missing.
+    files: Vec<String>,
 }
 
 /// The stored result of a view.
@@ -155,9 +157,10 @@ pub(super) fn put(
     error: Option<String>,
     write: impl FnOnce(&Path) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let record = Record { inputs: inputs.clone(), error };
     place.replace(|folder| {
         write(folder)?;
+        let files = names_in(folder).about(Field::Output)?;
+        let record = Record { inputs: inputs.clone(), error, files };
         let text = serde_json::to_string_pretty(&record).about(Field::Output)?;
         Ok(write_file(folder.join(VIEW_RECORD), text.as_bytes())?)
     })
@@ -177,10 +180,12 @@ pub(super) fn relative_view_folder(name: &str) -> String {
 pub(super) fn stored(sweep: &Path, name: &str) -> Option<Stored> {
     let folder = view_folder(sweep, name);
     let read = |file: &str| std::fs::read_to_string(folder.join(file)).ok();
-    let Record { inputs, error } = serde_json::from_str(&read(VIEW_RECORD)?).ok()?;
+    let Record { inputs, error, files } = serde_json::from_str(&read(VIEW_RECORD)?).ok()?;
+    if !files.iter().all(|file| folder.join(file).is_file()) {
+        return None;
+    }
     let outcome = match error {
         Some(error) => Err(error),
-        None if !folder.join("index.html").is_file() => return None,
         None => Ok(Report::from_json(&read("report.json")?).ok()?.without_times()),
     };
     Some(Stored { inputs, outcome })
