@@ -165,13 +165,16 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
             add_square(&mut shader, &filter, &places(pattern, n));
         }
         (Filter::Pcss { n, light }, _) => {
-            shader.constant("SHADOW_LIGHT_DIAMETER", light.diameter());
             let places = places(Pattern::Poisson, n);
+            shader.constant("SHADOW_LIGHT_DIAMETER", light.diameter());
+            shader.constant("SHADOW_NEAR_ENOUGH", Filter::NEAR_ENOUGH);
+            shader.constant("SHADOW_PLACE_SHARE", 1.0 / places.len() as f32);
+            let directions: Vec<_> = Filter::spiral_directions(places.len() as u32).collect();
             shader.add([
                 depths,
                 module!("filter/pcss"),
                 module!("blockers"),
-                generated::search(&places),
+                generated::search(&directions, &places),
             ]);
             add_square(&mut shader, &filter, &places);
         }

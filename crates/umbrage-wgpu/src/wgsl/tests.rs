@@ -400,7 +400,7 @@ fn examples_are_what_is_generated() {
         generated::pcf(2, Layout::Atlas),
         generated::hardware_pcf(2),
         generated::comparisons(&[[0.25, 0.0], [-0.25, 0.0]]),
-        generated::search(&[[0.25, 0.0], [-0.25, 0.0]]),
+        generated::search(&[[1.0, 0.0], [-0.7, 0.7]], &[[0.25, 0.0], [-0.25, 0.0]]),
         generated::taps(Axis::Rows, &[0.5, 0.25]),
         generated::encoded_outputs(0..1),
         generated::blurred_outputs(0..1),
