@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
     Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene, Rows,
-    Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan,
+    Shadowed, Shape, Texels, check_file, choose_light, choose_view, noise, plan, plan_fading,
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
@@ -54,6 +54,11 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let receivers = Receivers::new(&scene, tracer, args.fit.into());
     let seen = render_scene.seen(&receivers, &chosen.camera)?;
     let bounds = receivers.bounds(seen.as_ref());
+    // Pictures to look at hide where shadows end; others tell what the maps give.
+    let plan = match args.aov {
+        Aov::Color | Aov::Visibility => plan_fading,
+        _ => plan,
+    };
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(args.aov);
     if needs.motion {
@@ -118,7 +123,7 @@ impl Picture {
         bar: &Bar,
     ) -> Result<Self> {
         let advance = |rows| bar.advance(rows);
-        let mut executor = scene.executor(args.shadows.technique())?;
+        let mut executor = scene.executor(args.shadows.technique(), plan.fade.is_some())?;
         if needs.maps {
             bar.stage("shadow map");
             executor.render(plan, &advance)?;

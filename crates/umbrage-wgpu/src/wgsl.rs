@@ -116,7 +116,7 @@ pub(crate) fn named(text: &str, name: &str) -> String {
 }
 
 fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
-    let ShadowOptions { filter, comparison, layout, buffers } = *options;
+    let ShadowOptions { filter, comparison, layout, buffers, fades } = *options;
     let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
     let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
@@ -131,7 +131,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
     if !filter.has_maps() {
         return shader;
     }
-    shader.add([module!("choice")]);
+    shader.add([module!("choice"), if fades { module!("fade/far") } else { module!("fade/none") }]);
     add_width(&mut shader, &filter);
     add_reach(&mut shader, &filter);
     let depths = match layout {

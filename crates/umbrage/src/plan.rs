@@ -21,6 +21,27 @@ pub struct Plan {
     /// The dot product of this vector with a local point is the width of a pixel of the viewer's
     /// image at that point, in metres.
     pub pixel_gradient: DVec3,
+    /// Where shadows fade out before the view ends; `None` if they end there without a fade. See
+    /// [`Planner::set_fade`](crate::Planner::set_fade).
+    pub fade: Option<Fade>,
+}
+
+/// The fade of all shadows before the far plane of the view, beyond which no map serves any point.
+/// Without it, shadows on surfaces that go on beyond the far plane end at a straight line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fade {
+    /// The half-space in front of the far plane, in local space.
+    pub end: Plane,
+    /// Distance from the far plane over which shadows fade, metres, > 0.
+    pub length: f64,
+}
+
+impl Fade {
+    /// The share that is left of shadows at a local point: 1 until the fade begins, then linearly
+    /// less, and 0 from the far plane on.
+    pub fn share_left(self, local_position: DVec3) -> f64 {
+        (self.end.distance(local_position) / self.length).clamp(0.0, 1.0)
+    }
 }
 
 /// The part of a [`Plan`] that belongs to one light.
@@ -99,6 +120,13 @@ impl Plan {
         world_normal: DVec3,
     ) -> Option<Receiver> {
         self.maps.get(map)?.receiver(world_position, world_normal, self.pixel_gradient)
+    }
+
+    /// The visibility to show at a world point where the maps give `visibility`: a lookup's last
+    /// step, in which shadows [fade out](Self::fade).
+    pub fn faded(&self, world_position: DVec3, visibility: f64) -> f64 {
+        let share = self.fade.map_or(1.0, |fade| fade.share_left(world_position - self.origin));
+        1.0 - share + share * visibility
     }
 
     /// Indices of the maps that serve a world point under a light, each with its share of the
