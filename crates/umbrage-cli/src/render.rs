@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
     Certainty, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene,
-    Rows, Shadowed, Shape, Texels, check_file, noise, plan,
+    Rows, Shadowed, Shape, Texels, check_file, noise, plan, plan_fading,
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
@@ -61,6 +61,11 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let seen = render_scene.seen(&receivers, &chosen.camera)?;
     let bounds = receivers.bounds(seen.as_ref());
     bar.stage("planning");
+    // A picture to look at hides where shadows end; data tell what the maps give.
+    let plan = match &pictures[..] {
+        [PictureArgs { aov: Aov::Color, .. }] => plan_fading,
+        _ => plan,
+    };
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
     let needs = Needs::of(&pictures);
     if needs.motion {
@@ -141,7 +146,7 @@ impl Data {
         bar: &Bar,
     ) -> Result<Self> {
         let advance = |rows| bar.advance(rows);
-        let mut executor = scene.executor(args.shadows.technique())?;
+        let mut executor = scene.executor(args.shadows.technique(), plan.fade.is_some())?;
         if needs.maps {
             bar.stage("shadow map");
             executor.render(plan, &advance)?;

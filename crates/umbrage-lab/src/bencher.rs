@@ -52,7 +52,7 @@ impl<'a> Bencher<'a> {
         receivers: &Receivers,
         size: [u32; 2],
     ) -> Result<Self, Error> {
-        let executor = scene.executor(technique)?;
+        let executor = scene.executor(technique, false)?;
         let target = match &executor.work {
             Work::Gpu(on) => {
                 Some((FrameTarget::new(on.gpu, size).about(Field::Size)?, Timer::new(on.gpu)))

@@ -174,7 +174,7 @@ impl<'a> Comparison<'a> {
         let mut contenders = Vec::new();
         for (technique, (plan, ms)) in self.options.techniques.iter().zip(&self.plans) {
             progress.stage(&format!("{technique}: shadow map"));
-            let mut executor = self.prepared.render.executor(technique.technique())?;
+            let mut executor = self.prepared.render.executor(technique.technique(), false)?;
             let start = Instant::now();
             let filter = executor.render(plan, &|rows| progress.advance(rows))?;
             let depth = milliseconds(start) - filter.unwrap_or(0.0);

@@ -69,17 +69,19 @@ impl<'a> RenderScene<'a> {
         self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
     }
 
-    /// Returns the executor that renders the technique.
+    /// Returns the executor that renders the technique. If `fades` is true, its plans' shadows may
+    /// [fade out](umbrage::Plan::fade).
     ///
     /// # Errors
     /// An error if the GPU does not support the technique.
-    pub fn executor(&self, technique: &Technique) -> Result<Executor<'_>, Error> {
+    pub fn executor(&self, technique: &Technique, fades: bool) -> Result<Executor<'_>, Error> {
         let filter = technique.filter;
         let work = match self.gpu_for(technique) {
             Some((gpu, buffers)) => {
                 let options = ShadowOptions {
                     filter,
                     buffers: LookupBuffers::for_technique(technique, 1),
+                    fades,
                     ..ShadowOptions::default()
                 };
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;

@@ -81,7 +81,7 @@ pub use folder::{Contents, ReportFolder, check_file};
 pub use light::{ChosenLight, LightOptions, choose_light};
 pub use motion::{Motion, MovingView, Noise, flicker, noise};
 pub use picture::{Shadowed, Shape, Texels};
-pub use planning::{milliseconds, plan, plan_with, planner};
+pub use planning::{milliseconds, plan, plan_fading, plan_with, planner};
 pub use prepared::PreparedScene;
 pub use progress::Progress;
 pub use receivers::{Fit, Receivers};

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::technique::{MAX_SIDE, NamedTechnique};
 use std::time::Instant;
-use umbrage::{Bounds, Camera, Light, Limits, Plan, Planner};
+use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner};
 
 /// The largest number of times that a plan is made to measure its time.
 const RUNS: usize = 7;
@@ -28,6 +28,25 @@ pub fn plan(
     bounds: &Bounds<'_>,
 ) -> Result<Plan, Error> {
     plan_with(&mut planner(), technique, camera, light, bounds).cloned()
+}
+
+/// Plans a technique for one light, for a picture to look at: where receivers go on beyond the
+/// camera's far distance, shadows fade out before it.
+///
+/// # Errors
+/// As for [`plan`].
+pub fn plan_fading(
+    technique: &NamedTechnique,
+    camera: &Camera,
+    light: &Light,
+    bounds: &Bounds<'_>,
+) -> Result<Plan, Error> {
+    let mut planner = planner();
+    let receivers = bounds.receivers.unwrap_or(Aabb::EMPTY);
+    if receivers.corners().iter().any(|&corner| camera.depth(corner) > camera.far()) {
+        planner.set_fade(Planner::FADE).map_err(Error::Planning)?;
+    }
+    plan_with(&mut planner, technique, camera, light, bounds).cloned()
 }
 
 /// Plans a technique for one light with a planner, which keeps the plan.
@@ -87,6 +106,9 @@ pub fn milliseconds(start: Instant) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::defaults::Defaults;
+    use crate::view::{ViewOptions, choose_view};
+    use glam::DVec3;
 
     /// The median time of a job with these times, and how often the job runs.
     fn median(times: &[f64]) -> (f64, usize) {
@@ -104,6 +126,20 @@ mod tests {
         assert_eq!(median(&[20.0]), (20.0, 3));
         // The first run is slower, because the planner's buffers grow.
         assert_eq!(median(&[9.0, 1.0, 1.5, 1.0, 1.0, 4.0, 1.0]), (1.0, RUNS));
+    }
+
+    #[test]
+    fn shadows_fade_where_the_scene_goes_on() {
+        let scene = Aabb::new(DVec3::new(-50.0, 0.0, -50.0), DVec3::new(50.0, 9.0, 50.0));
+        let fades = |far| {
+            let view = ViewOptions { far: Some(far), ..ViewOptions::default() };
+            let camera = choose_view(&view, &Defaults::of(None)).unwrap().camera;
+            let light = Light::Directional { direction: DVec3::NEG_Y };
+            let technique = "uniform+z2".parse().unwrap();
+            let plan = plan_fading(&technique, &camera, &light, &Bounds::of_scene(scene)).unwrap();
+            plan.fade.is_some()
+        };
+        assert_eq!([20.0, 49.0, 51.0].map(fades), [true, true, false]);
     }
 
     #[test]

@@ -224,7 +224,8 @@ impl<'a> Reference<'a> {
 
     /// Visibility of a sample under one of the plan's lights, in [0, 1], as the shadow maps have
     /// it: 0 for surfaces that face away from the light, 1 for samples that no map serves. Where
-    /// slices overlap, the visibilities of their maps are blended.
+    /// slices overlap, the visibilities of their maps are blended. Shadows fade out as the plan has
+    /// it.
     pub fn visibility(&self, light: usize, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;
@@ -242,7 +243,8 @@ impl<'a> Reference<'a> {
             sum += share * f64::from(value);
             shares += share;
         }
-        if shares > 0.0 { (sum / shares) as f32 } else { 1.0 }
+        let visibility = if shares > 0.0 { sum / shares } else { 1.0 };
+        self.plan.faded(surface.position, visibility) as f32
     }
 
     /// The map with the largest share in a point's visibility under one of the plan's lights, and

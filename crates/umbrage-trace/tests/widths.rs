@@ -147,10 +147,7 @@ fn penumbrae_follow_the_distance_of_what_casts_them() {
         let filter = Filter::Pcss { n: 8, light: LightSize::Degrees(angle as f32) };
         for ramp in ramps(filter, *warp, *slices) {
             let ratio = ramp.metres / expected;
-            // A warp tilts depth: where the map's gutter widens what may cast, its depths begin
-            // earlier, and the search for blockers is wider than the light asks for.
-            let tolerance = if *warp == Warp::Lispsm { 0.3 } else { 0.15 };
-            assert!((ratio - 1.0).abs() < tolerance, "{warp:?}: {ratio} {ramp:?}");
+            assert!((ratio - 1.0).abs() < 0.08, "{warp:?}: {ratio} {ramp:?}");
         }
     }
 }

@@ -121,6 +121,14 @@ pub mod show_a_map {}
 #[doc = "```"]
 pub mod filters_per_light {}
 
+/// Texels are saved where shadows end nearer than the picture does. The camera that is planned for
+/// ends at that distance.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/shadow_distance.rs")]
+#[doc = "```"]
+pub mod shadow_distance {}
+
 /// The size of the picture is part of the camera. Nothing of [`Shadows`](crate::Shadows) depends on
 /// it.
 ///

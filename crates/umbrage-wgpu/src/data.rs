@@ -6,7 +6,7 @@ use crate::{Bias, Error, LookupBuffers};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4};
 use umbrage::visibility::Filter;
-use umbrage::{Place, Plan, ShadowMap, Slab};
+use umbrage::{Fade, Place, Plan, ShadowMap, Slab};
 
 /// `ShadowSettings`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -17,6 +17,7 @@ pub(crate) struct Settings {
     pub(crate) padding: u32,
     pub(crate) pixel_gradient: Vec4,
     pub(crate) eye: Vec4,
+    pub(crate) fade: Vec4,
 }
 
 /// `ShadowLight`.
@@ -128,6 +129,11 @@ impl Lookup {
                 let render_from_local = plan.origin - placed.render_origin;
                 (plan.viewer + (render_from_local * plan.viewer.w).extend(0.0)).as_vec4()
             },
+            // The plane at infinity leaves all of the shadows.
+            fade: plan.fade.map_or(Vec4::W, |Fade { end, length }| {
+                let render_origin = placed.render_origin - plan.origin;
+                (end.normal.extend(end.distance(render_origin)) / length).as_vec4()
+            }),
         };
     }
 

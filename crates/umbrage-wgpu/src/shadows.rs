@@ -36,6 +36,10 @@ pub struct ShadowOptions {
     /// The kind of the buffers from which lookups read what they need to know of the maps.
     /// [`Shadows::options`] gives the choice that the device allowed.
     pub buffers: LookupBuffers,
+    /// Whether lookups fade shadows out where the [plan](umbrage::Plan::fade) does. Without it they
+    /// refuse such plans, and have no instruction for it; with it they serve plans without a fade
+    /// too.
+    pub fades: bool,
 }
 
 /// The kind of the buffers from which lookups read lights, maps and planes.
@@ -522,7 +526,8 @@ impl Shadows {
     ///   into the device's textures.
     /// - [`Error::TooMany`] if there are more lights, maps or planes than uniform buffers hold, and
     ///   lookups read these (see [`LookupBuffers`]).
-    /// - [`Error::Invalid`] if `frame.render_origin` is not finite, or a box of `frame.casters` is
+    /// - [`Error::Invalid`] if the plan's shadows fade out and those of the options do not, if
+    ///   `frame.render_origin` is not finite, or a box of `frame.casters` is
     ///   not within 1e12 metres of the world's origin.
     ///
     /// After an error, the maps that are drawn and the data that shaders read are as before.
@@ -537,6 +542,12 @@ impl Shadows {
             return Err(Error::OtherFilter {
                 planned: plan.filter,
                 looked_up: self.options.filter,
+            });
+        }
+        if plan.fade.is_some() && !self.options.fades {
+            return Err(Error::Invalid {
+                field: "options.fades",
+                problem: "must be true for a plan whose shadows fade out, is false".into(),
             });
         }
         if !render_origin.is_finite() {

@@ -116,7 +116,7 @@ pub(crate) fn named(text: &str, name: &str) -> String {
 }
 
 fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
-    let ShadowOptions { filter, comparison, layout, buffers } = *options;
+    let ShadowOptions { filter, comparison, layout, buffers, fades } = *options;
     let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
     let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
@@ -131,7 +131,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
     if !filter.has_maps() {
         return shader;
     }
-    shader.add([module!("choice")]);
+    shader.add([module!("choice"), if fades { module!("fade/far") } else { module!("fade/none") }]);
     add_width(&mut shader, &filter);
     add_reach(&mut shader, &filter);
     let depths = match layout {
@@ -165,13 +165,16 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
             add_square(&mut shader, &filter, &places(pattern, n));
         }
         (Filter::Pcss { n, light }, _) => {
-            shader.constant("SHADOW_LIGHT_DIAMETER", light.diameter());
             let places = places(Pattern::Poisson, n);
+            shader.constant("SHADOW_LIGHT_DIAMETER", light.diameter());
+            shader.constant("SHADOW_NEAR_ENOUGH", Filter::NEAR_ENOUGH);
+            shader.constant("SHADOW_PLACE_SHARE", 1.0 / places.len() as f32);
+            let directions: Vec<_> = Filter::spiral_directions(places.len() as u32).collect();
             shader.add([
                 depths,
                 module!("filter/pcss"),
                 module!("blockers"),
-                generated::search(&places),
+                generated::search(&directions, &places),
             ]);
             add_square(&mut shader, &filter, &places);
         }

@@ -63,7 +63,7 @@ pub use camera::{Camera, ClipDepth, LookAt, Orthographic, ViewRay};
 pub use error::Error;
 pub use light::{Light, PointLight, SpotLight};
 pub use plan::{
-    Beam, CubeSide, Face, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
+    Beam, CubeSide, Face, Fade, MapError, Part, Plan, PlannedLight, Receiver, Rows, ShadowMap, Slab,
 };
 pub use planner::Planner;
 pub use seen::{Seen, SeenTile, SeenTiles};

@@ -27,6 +27,27 @@ pub struct Plan {
     /// point at infinity, whose fourth coordinate is 0. The line of sight at a local point p runs
     /// along p `viewer.w` − `viewer.xyz`.
     pub viewer: DVec4,
+    /// Where shadows fade out before the view ends; `None` if they end there without a fade. See
+    /// [`Planner::set_fade`](crate::Planner::set_fade).
+    pub fade: Option<Fade>,
+}
+
+/// The fade of all shadows before the far plane of the view, beyond which no map serves any point.
+/// Without it, shadows on surfaces that go on beyond the far plane end at a straight line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fade {
+    /// The half-space in front of the far plane, in local space.
+    pub end: Plane,
+    /// Distance from the far plane over which shadows fade, metres, > 0.
+    pub length: f64,
+}
+
+impl Fade {
+    /// The share that is left of shadows at a local point: 1 until the fade begins, then linearly
+    /// less, and 0 from the far plane on.
+    pub fn share_left(self, local_position: DVec3) -> f64 {
+        (self.end.distance(local_position) / self.length).clamp(0.0, 1.0)
+    }
 }
 
 /// The part of a [`Plan`] that belongs to one light.
@@ -106,6 +127,13 @@ impl Plan {
         world_normal: DVec3,
     ) -> Option<Receiver> {
         self.maps.get(map)?.receiver(world_position, world_normal, self)
+    }
+
+    /// The visibility to show at a world point where the maps give `visibility`: a lookup's last
+    /// step, in which shadows [fade out](Self::fade).
+    pub fn faded(&self, world_position: DVec3, visibility: f64) -> f64 {
+        let share = self.fade.map_or(1.0, |fade| fade.share_left(world_position - self.origin));
+        1.0 - share + share * visibility
     }
 
     /// Indices of the maps that serve a world point under a light, each with its share of the
@@ -407,15 +435,34 @@ impl ShadowMap {
     /// receiver, for a light of [diameter](crate::visibility::LightSize::diameter) 1 (Fernando
     /// 2005): metres across the receiver's beam, per metre of a lamp's diameter or per unit of the
     /// sun's.
+    ///
+    /// Under a lamp, distances count along the axis of its light, as if the lamp were a disc across
+    /// that axis. In planes across the axis texels are in proportion, so an occluder hides some of
+    /// the light if it lies less than half this width from the receiver's beam, however far away
+    /// that is. (In the plane across the receiver's own beam, texels towards its horizon are far
+    /// away, and their penumbrae would be as wide as that.)
     pub(crate) fn penumbra(&self, receiver: &Receiver, st: DVec2, depth: f64) -> f64 {
         let [[here, step], [there, _]] = [receiver.st, st].map(|st| self.beam_scale(st));
-        let level = receiver.depth + receiver.level_slope.dot(st - receiver.st);
         if step == 0.0 {
+            let level = receiver.depth + receiver.level_slope.dot(st - receiver.st);
             return ((level - depth) / (receiver.depth_per_metre * there / here)).max(0.0);
         }
-        // Distance from a lamp is inversely proportional to the fourth coordinate.
-        let [at, level] = [depth, level].map(|d| there + step * d);
-        if level > 0.0 { (at / level - 1.0).clamp(0.0, 1e6) } else { 0.0 }
+        // Distance from a lamp along a beam is inversely proportional to the fourth coordinate.
+        let inverse = |st, w| w / self.axial_distance(st).unwrap_or(1.0);
+        let caster = inverse(st, there + step * depth);
+        let level = inverse(receiver.st, here + step * receiver.depth);
+        if level > 0.0 { (caster / level - 1.0).clamp(0.0, 1e6) } else { 0.0 }
+    }
+
+    /// Under a lamp, the distance from it along the axis of its light, metres, times the fourth
+    /// coordinate, of the points of the beam through `st`. It does not depend on depth, because the
+    /// lamp is the point at which depth is infinite. `None` under parallel light.
+    fn axial_distance(&self, st: DVec2) -> Option<f64> {
+        let (Some(apex), Slab::Distances { axis, .. }) = (self.apex, self.slab) else {
+            return None;
+        };
+        let h = self.local_from_shadow * st.extend(0.0).extend(1.0);
+        Some(axis.dot(h.xyz() - apex * h.w))
     }
 
     /// The fourth coordinate along a beam, from shadow space to local space: its value at depth 0,

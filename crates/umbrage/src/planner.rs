@@ -1,11 +1,11 @@
 use crate::bounds::{Aabb, Bounds, Plane};
 use crate::box_tree::BoxTree;
 use crate::camera::Camera;
-use crate::error::Error;
+use crate::error::{Error, check};
 use crate::focus::{Body, frustum_planes, thickened};
 use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
-use crate::plan::{Part, Plan, PlannedLight, ShadowMap};
+use crate::plan::{Fade, Part, Plan, PlannedLight, ShadowMap};
 use crate::resolution::resolutions;
 use crate::seen::cells::Cells;
 use crate::technique::{Faces, Limits, Technique};
@@ -64,6 +64,8 @@ mod slices;
 #[derive(Clone, Debug, Default)]
 pub struct Planner {
     limits: Limits,
+    /// The share of the view's far distance over which shadows fade out; 0 for no fade.
+    fade: f64,
     plan: Plan,
     drafts: Vec<Draft>,
     /// Each map's largest errors in s and t if it had one texel, pixels per texel; 0 for maps
@@ -172,6 +174,23 @@ impl Planner {
         Self { limits, ..Self::default() }
     }
 
+    /// A share of the far distance for [`set_fade`](Self::set_fade) that hides the end of shadows
+    /// and costs few of them.
+    pub const FADE: f64 = 0.1;
+
+    /// Makes shadows fade out before the far plane of the view, over the last `share` of the far
+    /// distance. Use it where the camera that is planned for ends nearer than the one that draws
+    /// the picture, so that shadows end at a distance at which surfaces are still seen. 0, the
+    /// default, stands for no fade. Lookups take the fade from the plan ([`Plan::fade`]).
+    ///
+    /// # Errors
+    /// If `share` is not in 0 ..= 1.
+    pub fn set_fade(&mut self, share: f64) -> Result<(), Error> {
+        check((0.0..=1.0).contains(&share), "fade", || format!("must be 0 to 1, is {share}"))?;
+        self.fade = share;
+        Ok(())
+    }
+
     /// Forgets the last plan, so that the next one keeps nothing of it. The plan is the same; this is
     /// for measuring what a plan costs when everything has changed.
     pub fn forget(&mut self) {
@@ -213,6 +232,11 @@ impl Planner {
             self.last.lights.clear();
             self.focus(camera, bounds);
         }
+        self.plan.fade = (self.fade > 0.0).then(|| Fade {
+            end: Plane { normal: -camera.forward(), offset: camera.far() },
+            // The near plane of an orthographic view may lie behind the eye.
+            length: self.fade * (camera.far() - camera.near().min(0.0)),
+        });
         let frame = Frame { camera, bounds, technique, limits: self.limits };
         std::mem::swap(&mut self.units, &mut self.last.units);
         std::mem::swap(&mut self.sizes, &mut self.last.sizes);

@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Config, camera, config, direction, planner, point_in_view, reach, technique};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 use umbrage::{
-    Bounds, Camera, Face, Faces, Light, LookAt, Objective, Partition, Planner, PointLight,
+    Bounds, Camera, Face, Faces, Light, LookAt, Objective, Partition, Plan, Planner, PointLight,
     ShadowMap, Splits, Technique, Warp,
 };
 
@@ -41,6 +41,29 @@ fn storage(planner: &mut Planner, light: Light, warp: Warp, slices: u32, faces: 
     let technique = Technique { partition, ..technique(warp) };
     let plan = planner.plan(&reference_view(), &[light], &Bounds::default(), &technique);
     plan.unwrap().storage_factor()
+}
+
+/// Shadows fade over the last part of the view, and nothing else of the plan changes.
+#[test]
+fn shadows_fade_out_before_the_view_ends() {
+    let camera = reference_view();
+    let technique = Technique { partition: Partition::slices(3), ..technique(ADAPTIVE) };
+    let mut planner = Planner::new();
+    let mut plan = |share| {
+        planner.set_fade(share).unwrap();
+        planner.plan(&camera, &[OVERHEAD], &Bounds::default(), &technique).unwrap().clone()
+    };
+    let (without, with) = (plan(0.0), plan(0.2));
+    let at = |depth: f64| camera.eye() + camera.ray(DVec2::new(400.0, 100.0)).at(depth);
+    for (depth, left) in [(1.0, 1.0), (799.0, 1.0), (900.0, 0.5), (980.0, 0.1), (1001.0, 0.0)] {
+        let faded = with.faded(at(depth), 0.25);
+        assert!((faded - (1.0 - 0.75 * left)).abs() < 1e-12, "{depth}: {faded}");
+        assert_eq!(without.faded(at(depth), 0.25), 0.25);
+    }
+    assert_eq!(Plan { fade: None, ..with }, without);
+    for share in [-0.1, 1.1, f64::NAN] {
+        assert!(planner.set_fade(share).unwrap_err().to_string().starts_with("fade: "));
+    }
 }
 
 /// The reference figures, for k = 1, 2, 4, 8, 16 slices, from the errors of whole plans.

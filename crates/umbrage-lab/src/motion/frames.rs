@@ -132,5 +132,5 @@ pub(super) fn executors<'a>(
     scene: &'a RenderScene<'_>,
     techniques: &[NamedTechnique],
 ) -> Result<Vec<Executor<'a>>, Error> {
-    techniques.iter().map(|t| scene.executor(t.technique())).collect()
+    techniques.iter().map(|t| scene.executor(t.technique(), false)).collect()
 }

@@ -290,33 +290,50 @@ fn shadow_lit_share(map: u32, receiver: ShadowReceiver, square: ShadowSquare) ->
     Module { path: "comparisons", text: text.into() }
 }
 
-/// `shadow_blockers`: the search for casters at `places` of a square.
-pub(super) fn search(places: &[[f32; 2]]) -> Module {
-    let compared: String = places
-        .iter()
-        .map(|[x, y]| {
-            format!(
-                "    sum += shadow_blocker(map, receiver, penumbrae, square, vec2f({x:?}, {y:?}));\n"
-            )
-        })
-        .collect();
+/// `shadow_widest` and `shadow_blockers`: the two steps of the search for casters, one along a
+/// spiral with places in these directions, the other at `places` of a disc.
+pub(super) fn search(directions: &[[f32; 2]], places: &[[f32; 2]]) -> Module {
+    let blocker = |scale: &str, [x, y]: &[f32; 2]| {
+        format!("shadow_blocker(map, receiver, penumbrae, disc, {scale}vec2f({x:?}, {y:?}))")
+    };
+    let widest = directions.iter().map(|p| {
+        let width = blocker("radius * ", p) + ".y";
+        format!("    widest = max(widest, {width});\n    radius *= ratio;\n")
+    });
+    let summed = places.iter().map(|p| format!("    sum += {};\n", blocker("", p)));
     let text = format!(
         "\
-import package::blockers::{{ShadowBlockers, ShadowPenumbrae, shadow_blocker}};
+import package::blockers::{{ShadowDisc, ShadowPenumbrae, shadow_blocker}};
 import package::receiver::ShadowReceiver;
-import package::square::ShadowSquare;
 
-// Written by `generated.rs`: the search for casters in a square.
+// Written by `generated.rs`: the widest penumbra among the texels along a logarithmic spiral, whose
+// radius changes by `ratio` from place to place.
+fn shadow_widest(
+    map: u32,
+    receiver: ShadowReceiver,
+    penumbrae: ShadowPenumbrae,
+    disc: ShadowDisc,
+    ratio: f32,
+) -> f32 {{
+    var widest = 0.0;
+    var radius = 0.5;
+{}    return widest;
+}}
+
+// Written by `generated.rs`: the number of texels that hide some of the light, and the sum of the
+// widths of their penumbrae.
 fn shadow_blockers(
     map: u32,
     receiver: ShadowReceiver,
     penumbrae: ShadowPenumbrae,
-    square: ShadowSquare,
-) -> ShadowBlockers {{
+    disc: ShadowDisc,
+) -> vec2f {{
     var sum = vec2f(0.0);
-{compared}    return ShadowBlockers(sum.x, sum.y);
+{}    return sum;
 }}
-"
+",
+        widest.collect::<String>(),
+        summed.collect::<String>()
     );
     Module { path: "search", text: text.into() }
 }

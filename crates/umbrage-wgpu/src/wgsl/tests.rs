@@ -84,7 +84,14 @@ fn variants() -> impl Iterator<Item = ShadowOptions> {
         comparisons.into_iter().flat_map(move |comparison| {
             [Layout::Atlas, Layout::Layers].into_iter().flat_map(move |layout| {
                 let buffers = [LookupBuffers::Uniform, LookupBuffers::Storage];
-                buffers.map(|buffers| ShadowOptions { filter, comparison, layout, buffers })
+                buffers.map(|buffers| ShadowOptions {
+                    filter,
+                    comparison,
+                    layout,
+                    buffers,
+                    // The two ways differ in one function alone.
+                    fades: filter == Filter::Hard || filter == Filter::None,
+                })
             })
         })
     };
@@ -190,7 +197,7 @@ fn structs_are_laid_out_alike() {
         m,
         "ShadowSettings",
         data::Settings,
-        [texture_scale, light_count, pixel_gradient, eye]
+        [texture_scale, light_count, pixel_gradient, eye, fade]
     );
     check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, choice, axis, ends]);
     check_layout!(
@@ -400,7 +407,7 @@ fn examples_are_what_is_generated() {
         generated::pcf(2, Layout::Atlas),
         generated::hardware_pcf(2),
         generated::comparisons(&[[0.25, 0.0], [-0.25, 0.0]]),
-        generated::search(&[[0.25, 0.0], [-0.25, 0.0]]),
+        generated::search(&[[1.0, 0.0], [-0.7, 0.7]], &[[0.25, 0.0], [-0.25, 0.0]]),
         generated::taps(Axis::Rows, &[0.5, 0.25]),
         generated::encoded_outputs(0..1),
         generated::blurred_outputs(0..1),

@@ -14,6 +14,8 @@ mod fit_to_seen;
 pub(crate) mod kitchen;
 #[path = "../../cookbook/resizing.rs"]
 mod resizing;
+#[path = "../../cookbook/shadow_distance.rs"]
+mod shadow_distance;
 #[path = "../../cookbook/show_a_map.rs"]
 mod show_a_map;
 #[path = "../../cookbook/smooth_normals.rs"]
@@ -279,6 +281,23 @@ fn lights_have_filters_of_their_own() {
     let channel = |c: usize| picture.iter().map(|p| [p[c], 0, 0, 255]).collect::<Vec<_>>();
     kitchen.check(&channel(0), &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
     kitchen.check(&channel(1), &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, position - p));
+}
+
+#[test]
+fn shadows_fade_out_at_their_distance() {
+    let [eye, target] = [DVec3::Y, DVec3::Y + DVec3::NEG_Z];
+    let (fov_y_rad, near, far, image) = (1.0, 0.1, 1000.0, [640, 360]);
+    let view = umbrage::LookAt { eye, target, up: DVec3::Y, fov_y_rad, near, far, image };
+    let mut planner = umbrage::Planner::new();
+    let given = (&[SUN][..], &Bounds::default());
+    let technique = technique("uniform(stable)+z4");
+    let plan =
+        shadow_distance::shadows_up_to(&mut planner, (view, 80.0), given, &technique).unwrap();
+    let served = |depth: f64| plan.lookup(0, eye + DVec3::NEG_Z * depth).next().is_some();
+    let faded = |depth: f64| plan.faded(eye + DVec3::NEG_Z * depth, 0.0);
+    assert!(served(79.9) && !served(80.1));
+    assert_eq!([faded(71.9), faded(80.1)], [0.0, 1.0]);
+    assert!((faded(76.0) - 0.5).abs() < 1e-9);
 }
 
 #[test]

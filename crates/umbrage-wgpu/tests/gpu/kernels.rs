@@ -8,7 +8,7 @@ use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{
     Blur, Filter, LightSize, Pattern, Prefilter, Width, texel_coordinates, visibility,
 };
-use umbrage::{Faces, Plan, Technique};
+use umbrage::{Bounds, Faces, Plan, Planner, Technique};
 use umbrage_testing::needs;
 use umbrage_wgpu::{
     Bias, Casters, Comparison, Frame, Layout, LookupBuffers, ShadowOptions, Shadows, Timestamps,
@@ -145,7 +145,7 @@ fn expected(shadows: &Shadows, plan: &Plan, light: usize, p: DVec3, n: DVec3) ->
         sum += share * f64::from(value);
         shares += share;
     }
-    if shares > 0.0 { sum / shares } else { 1.0 }
+    plan.faded(p, if shares > 0.0 { sum / shares } else { 1.0 })
 }
 
 const VISIBILITY: &str = "
@@ -184,10 +184,13 @@ fn agrees_to(
         _ if technique.partition.faces == Faces::Whole => &lights[..],
         _ => &lights[..1],
     };
-    let plan = plan(&camera(EYE), lights, technique);
+    let mut planner = Planner::new();
+    planner.set_fade(if shadow_options.fades { 0.9 } else { 0.0 }).unwrap();
+    let bounds = Bounds::of_scene(scene());
+    let plan = planner.plan(&camera(EYE), lights, &bounds, technique).unwrap();
     let origin = origin.unwrap_or(plan.origin);
-    let shadows = random_depths(&bench, shadow_options, &plan, origin);
-    let table = points(&plan, 3000);
+    let shadows = random_depths(&bench, shadow_options, plan, origin);
+    let table = points(plan, 3000);
     let mut served = 0;
     let mut wrong = 0;
     for light in 0..lights.len() {
@@ -203,7 +206,7 @@ fn agrees_to(
         let outputs: Vec<f32> = bench.compute(&shadows, &format!("{POINT}{VISIBILITY}"), &inputs);
         for (&(p, n), out) in table.iter().zip(outputs) {
             served += usize::from(plan.lookup(light, p).next().is_some());
-            let expected = expected(&shadows, &plan, light, p, n);
+            let expected = expected(&shadows, plan, light, p, n);
             assert!((0.0..=1.0).contains(&out), "{p}: {out}");
             wrong += usize::from((f64::from(out) - expected).abs() > tolerance);
         }
@@ -232,6 +235,7 @@ fn every_filter_and_layout_is_looked_up_as_in_rust() {
         let hard = ShadowOptions { layout, ..Default::default() };
         agrees(&ShadowOptions { buffers: LookupBuffers::Storage, ..hard }, &technique, None);
         agrees(&hard, &technique, None);
+        agrees(&ShadowOptions { fades: true, ..hard }, &technique, None);
         // A single texel has one depth to compare with, so both kinds of comparison must agree.
         agrees(&ShadowOptions { comparison: Comparison::Hardware, ..hard }, &technique, None);
     }

@@ -1,11 +1,11 @@
 //! Requests that cannot be met give errors that name the reason, and nothing panics.
 
 use crate::device::Bench;
-use crate::{EYE, bench, camera, lights, plan, sun};
+use crate::{EYE, bench, camera, lights, plan, scene, sun};
 use glam::DVec3;
 use umbrage::visibility::statistic::{Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Pattern, Prefilter, Width};
-use umbrage::{Faces, Partition, Size, Technique, Warp};
+use umbrage::{Bounds, Faces, Partition, Planner, Size, Technique, Warp};
 use umbrage_testing::needs;
 use umbrage_wgpu::{
     Bias, Casters, Error, Frame, Layout, LookupBuffers, ShadowOptions, Shadows, Support, Timestamps,
@@ -80,6 +80,30 @@ fn a_plan_for_another_filter_is_refused() {
         assert!(error.to_string().contains("`pcf3`"), "{error}");
     }
     prepare(&pcf3).unwrap();
+}
+
+/// A lookup without the fade would show shadows that end at a line.
+#[needs(gpu)]
+#[test]
+fn a_plan_that_fades_is_refused_without_the_option() {
+    let bench = bench();
+    let mut planner = Planner::new();
+    planner.set_fade(Planner::FADE).unwrap();
+    let bounds = Bounds::of_scene(scene());
+    let plan = planner.plan(&camera(EYE), &[sun()], &bounds, &Technique::default()).unwrap();
+    let frame = Frame { plan, render_origin: EYE, casters: Casters::Unmoved };
+    for fades in [false, true] {
+        let options = ShadowOptions { fades, ..ShadowOptions::default() };
+        let mut shadows = Shadows::new(&bench.device, bench.support, &options).unwrap();
+        let prepared = shadows.prepare(&bench.device, &bench.queue, &frame).map(drop);
+        let error = prepared.map_err(|e| e.to_string());
+        let is_right = if fades {
+            error.is_ok()
+        } else {
+            error.clone().unwrap_err().starts_with("options.fades")
+        };
+        assert!(is_right, "{fades}: {error:?}");
+    }
 }
 
 #[needs(gpu)]

@@ -40,6 +40,7 @@
 
 pub mod statistic;
 
+mod blockers;
 mod disc;
 mod prefilter;
 mod width;
@@ -49,6 +50,7 @@ pub use width::{LightSize, Width};
 
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap};
+use blockers::Blockers;
 use glam::DVec2;
 use statistic::Channels;
 
@@ -91,13 +93,15 @@ pub enum Filter {
         /// Where the comparisons are made.
         pattern: Pattern,
     },
-    /// Percentage-closer soft shadows (Fernando 2005). First, a search among all texels that can
+    /// Percentage-closer soft shadows (Fernando 2005). First, a search among the texels that can
     /// hide some of the light from the receiver finds the mean width of the penumbra; then
-    /// comparisons over that width give the lit share. Plans for this filter [keep the depths of
-    /// casters](Self::keeps_casters).
+    /// comparisons over that width give the lit share. The search itself has two steps: how far
+    /// away a caster can lie and still hide some of the light depends on the casters around, so a
+    /// first step finds the widest penumbra, and the second step searches as far as that. Plans for
+    /// this filter [keep the depths of casters](Self::keeps_casters).
     Pcss {
-        /// There are n² comparisons in the search and as many over the penumbra. n is clamped to 1
-        /// ..= [`MAX_DISC`](Self::MAX_DISC).
+        /// There are n² comparisons in each step of the search and as many over the penumbra. n is
+        /// clamped to 1 ..= [`MAX_DISC`](Self::MAX_DISC).
         n: u32,
         /// Size of the light: an angle for directional lights, a length for spot and point lights.
         light: LightSize,
@@ -164,6 +168,21 @@ impl Filter {
     /// are n² places for n = [`MAX_DISC`](Self::MAX_DISC).
     pub fn disc_places(count: u32) -> &'static [[f32; 2]] {
         &disc::PLACES[..(count as usize).min(disc::MAX_PLACES)]
+    }
+
+    /// In the first step of the search of [`Pcss`](Self::Pcss), a texel counts whose penumbra
+    /// reaches this share of the way to it, because each place stands for those around it.
+    pub const NEAR_ENOUGH: f32 = 0.3;
+
+    /// The directions of the places of the first step of the search of [`Pcss`](Self::Pcss), from
+    /// the outermost place to the innermost. The golden angle between them spreads the directions
+    /// of successive places evenly.
+    pub fn spiral_directions(count: u32) -> impl Iterator<Item = [f32; 2]> {
+        let golden_angle = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+        (0..count).map(move |k| {
+            let (sin, cos) = (f64::from(k) * golden_angle).sin_cos();
+            [cos as f32, sin as f32]
+        })
     }
 
     /// The prefilter, if the filter is one.
@@ -308,13 +327,11 @@ pub fn visibility(
     let texel = texel_coordinates(map, st);
     let test = Test::new(map, receiver);
     let is_lit = |i, j| f64::from(texels.depth(i, j)) >= test.nearest_lit(i, j);
-    // The nearest texel to each place of a pattern that spans a width.
-    let spread = |metric, pattern, n| {
-        let ends = drawn(map, filter);
-        offsets(metric, pattern, n).map(move |offset| nearest(texel + offset, ends))
-    };
-    let lit_share = |metric, pattern, n| {
-        let lit = spread(metric, pattern, n).filter(|&[i, j]| is_lit(i, j)).count();
+    let lit_share = |metric, pattern: Pattern, n| {
+        let (square, ends) = (Square::new(metric), drawn(map, filter));
+        let places = (0..n * n).map(|k| square.offset(pattern.place(k, n)));
+        let texels = places.map(|offset| nearest(texel + offset, ends));
+        let lit = texels.filter(|&[i, j]| is_lit(i, j)).count();
         (lit as f64 / f64::from(n * n)) as f32
     };
     match filter {
@@ -338,22 +355,11 @@ pub fn visibility(
         }
         Filter::Pcss { n, light } => {
             let n = n.clamp(1, Filter::MAX_DISC);
-            let source = light.diameter();
-            let across = |width: f64| receiver.texel_metric.map(|m| m * width * width);
-            let penumbra = |st, depth| f64::from(source) * map.penumbra(receiver, st, depth);
-            // Occluders lie between the receiver and the light, at depths of 0 or more. Those at
-            // depth 0 cast the widest penumbra, so the search covers its width.
-            let (mut widths, mut hidden) = (0.0, 0u32);
-            for [i, j] in spread(across(penumbra(st, 0.0)), Pattern::Poisson, n) {
-                if !is_lit(i, j) {
-                    widths += penumbra(test.center(i, j), f64::from(texels.depth(i, j)));
-                    hidden += 1;
-                }
-            }
-            if hidden == 0 {
-                return 1.0;
-            }
-            lit_share(across(widths / f64::from(hidden)), Pattern::Poisson, n)
+            let (ends, diameter) = (drawn(map, filter), f64::from(light.diameter()));
+            let blockers = Blockers { test: &test, texels: &texels, texel, ends, n, diameter };
+            blockers
+                .mean_width()
+                .map_or(1.0, |width| lit_share(across(receiver, width), Pattern::Poisson, n))
         }
         Filter::Prefiltered(prefilter) => {
             let [low, high] = drawn(map, filter);
@@ -379,17 +385,37 @@ fn nearest(place: DVec2, [low, high]: [DVec2; 2]) -> [i32; 2] {
     place.clamp(low, high).floor().to_array().map(|i| i as i32)
 }
 
-/// Offsets in texels of a pattern's places over a width with this metric (texels²: squared extents
-/// in s and t, and their product), which is enlarged to at least one texel each way.
-fn offsets([ss, tt, st]: [f64; 3], pattern: Pattern, n: u32) -> impl Iterator<Item = DVec2> {
-    // Sides of the parallelogram that the square becomes in the map.
-    let across = ss.max(1.0).sqrt();
-    let shear = st / across;
-    let along = (tt - shear * shear).max(1.0).sqrt();
-    (0..n * n).map(move |k| {
-        let [u, v] = pattern.place(k, n);
-        DVec2::new(across * u, shear * u + along * v)
-    })
+/// The squared extents in s and t, and their product, texels², of a width in metres across a
+/// receiver's beam.
+fn across(receiver: &Receiver, width: f64) -> [f64; 3] {
+    receiver.texel_metric.map(|m| m * width * width)
+}
+
+/// The parallelogram of texels that a square across a receiver's beam becomes in the map.
+struct Square {
+    across: f64,
+    shear: f64,
+    along: f64,
+}
+
+impl Square {
+    /// The square with this metric (texels²: squared extents in s and t, and their product),
+    /// which is enlarged to at least one texel each way.
+    fn new([ss, tt, st]: [f64; 3]) -> Self {
+        let across = ss.max(1.0).sqrt();
+        let shear = st / across;
+        Self { across, shear, along: (tt - shear * shear).max(1.0).sqrt() }
+    }
+
+    /// Offset in texels of a place in the square of side 1 around 0.
+    fn offset(&self, [u, v]: [f64; 2]) -> DVec2 {
+        DVec2::new(self.across * u, self.shear * u + self.along * v)
+    }
+
+    /// The longest that a texel is as a share of the square's side, at most 1.
+    fn texel(&self) -> f64 {
+        1.0 / self.across.min(self.along)
+    }
 }
 
 /// The comparison of one receiver with the texels of a map.
