@@ -41,8 +41,7 @@ const WORLD_END: f64 = 1e12;
 ///   elsewhere.
 /// - Spot light cones with half angles beyond 85° are narrowed to 85°.
 ///
-/// Vertex colours, morph targets and orthographic cameras are not supported and are left out, also
-/// with a notice.
+/// Vertex colours and morph targets are not supported and are left out, also with a notice.
 ///
 /// # Errors
 /// The file cannot be read, is cut off, refers to files outside its folder, has indices out of

@@ -88,11 +88,10 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
         log_range(0.01, 10.0),
         log_range(1.001, 1e4),
         prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
-        orthographic_height(),
     )
-        .prop_map(|(eye, forward, up, fov, near, ratio, image, height)| {
+        .prop_map(|(eye, forward, up, fov, near, ratio, image)| {
             let (target, far) = (eye + forward, near * ratio);
-            let camera = match height {
+            let camera = match orthographic(fov) {
                 None => {
                     let fov_y_rad = fov.to_radians();
                     Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
@@ -109,11 +108,18 @@ pub(crate) fn camera() -> impl Strategy<Value = Camera> {
         })
 }
 
-/// The height of an orthographic view over its range of depths, and where it begins; `None` for
-/// perspective views.
-fn orthographic_height() -> impl Strategy<Value = Option<(f64, f64)>> {
-    let begin = prop_oneof![2 => Just(1.0), 1 => Just(0.0), 1 => -2.0..1.0f64];
-    proptest::option::weighted(0.4, (log_range(0.01, 100.0), begin))
+/// The height of an orthographic view over its range of depths, and where it begins in units of its
+/// near distance; `None` for perspective views. Both follow from the digits of a random number, so
+/// that the numbers drawn are the same for both kinds.
+fn orthographic(random: f64) -> Option<(f64, f64)> {
+    let share = |from: u32| (random.to_bits() >> from & 0xfff) as f64 / 4096.0;
+    let height = 0.01 * 1e4f64.powf(share(12));
+    let begin = match share(24) {
+        half if half < 0.5 => 1.0,
+        quarter if quarter < 0.75 => 0.0,
+        rest => 12.0 * rest - 11.0,
+    };
+    (share(0) < 0.4).then_some((height, begin))
 }
 
 /// Partitions of every kind; one in three is a single map.
@@ -176,7 +182,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
         move |([x, y, z], from, half, distance)| {
             let seen = point_in_view(&camera, [x, y, z]);
-            let distance = distance * reach(&camera);
+            let distance = distance * size(&camera);
             Light::Spot(SpotLight {
                 position: seen - from * distance,
                 direction: from,
@@ -192,7 +198,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
 fn point(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.0..1.0f64, 0.0..1.0, 0.0..1.0], direction(), log_range(1e-3, 3.0)).prop_map(
         move |(place, away, distance)| {
-            let distance = distance * reach(&camera);
+            let distance = distance * size(&camera);
             Light::Point(PointLight {
                 position: point_in_view(&camera, place) + away * distance,
                 near: distance * 0.01,
@@ -242,6 +248,11 @@ pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
 pub(crate) fn detail(camera: &Camera) -> f64 {
     let height = camera.pixel_width(camera.near()) * f64::from(camera.image()[1]);
     if camera.is_orthographic() { height.min(camera.far() - camera.near()) } else { camera.near() }
+}
+
+/// The largest length that matters to a camera's maps, metres.
+pub(crate) fn size(camera: &Camera) -> f64 {
+    if camera.is_orthographic() { reach(camera) } else { camera.far() }
 }
 
 /// The largest distance from the eye at which a camera sees anything, metres.
