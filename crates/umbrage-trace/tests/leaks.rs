@@ -8,7 +8,7 @@ use glam::DVec2;
 use std::path::Path;
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, Prefilter, texel_coordinates};
-use umbrage::{Bounds, BoxTree, Camera, Plan, Planner, Receiver, Technique, Warp};
+use umbrage::{Bounds, BoxTree, Plan, Planner, Receiver, Technique, Warp};
 use umbrage_scene::Scene;
 use umbrage_testing::{needs, third_party_scenes};
 use umbrage_trace::{DepthMap, Reference, Tracer, View};

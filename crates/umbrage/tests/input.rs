@@ -7,8 +7,8 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
     Aabb, Bounds, BoxTree, Camera, ClipDepth, Cover, Error, Faces, Light, Limits, LookAt,
-    Partition, Plan, Planner, PointLight, Seen, SeenTiles, Size, Splits, SpotLight, Technique,
-    Warp,
+    Orthographic, Partition, Plan, Planner, PointLight, Seen, SeenTiles, Size, Splits, SpotLight,
+    Technique, Warp,
 };
 
 const VIEW: LookAt = LookAt {
@@ -450,6 +450,122 @@ fn cameras_from_any_engines_matrices() {
     let bad =
         Camera::from_matrices(mirrored, infinite, ClipDepth::ZeroToOne, Some(9.0), VIEW.image);
     assert_eq!(field(bad), "camera.world_from_view");
+}
+
+/// An orthographic camera from matrices equals that from eye and target, in every convention. The
+/// pose tells handedness.
+#[test]
+fn orthographic_cameras_from_any_engines_matrices() {
+    let LookAt { eye, target, up, far, image, .. } = VIEW;
+    let (near, height) = (-3.0, 7.0);
+    let view = Orthographic { eye, target, up, height, near, far, image };
+    let expected = Camera::orthographic(view).unwrap();
+    let pose = |back: DVec3| {
+        let (r, u) = (expected.right(), expected.up());
+        DMat4::from_cols(r.extend(0.0), u.extend(0.0), back.extend(0.0), eye.extend(1.0))
+    };
+    let y = 2.0 / height;
+    let x = y * 480.0 / 640.0;
+    let length = far - near;
+    // Depth = a + b · distance, the picture's middle aside by (c, d), and everything times w.
+    let projection = |sign: f64, [a, b]: [f64; 2], [c, d]: [f64; 2], w: f64| {
+        DMat4::from_cols(
+            DVec4::X * x * w,
+            DVec4::Y * y * w,
+            DVec4::Z * b * sign * w,
+            DVec4::new(c * w, d * w, a * w, w),
+        )
+    };
+    let zero_to_one = [-near / length, 1.0 / length];
+    let reversed = [far / length, -1.0 / length];
+    let open_gl = [-(far + near) / length, 2.0 / length];
+    for (name, sign, ends, depth) in [
+        ("0 to 1", -1.0, zero_to_one, ClipDepth::ZeroToOne),
+        ("0 to 1, left-handed", 1.0, zero_to_one, ClipDepth::ZeroToOne),
+        ("reversed", -1.0, reversed, ClipDepth::ZeroToOne),
+        ("reversed, left-handed", 1.0, reversed, ClipDepth::ZeroToOne),
+        ("OpenGL", -1.0, open_gl, ClipDepth::MinusOneToOne),
+    ] {
+        let pose = pose(expected.forward() * sign);
+        for (aside, w) in [([0.0, 0.0], 1.0), ([0.3, -1.4], 2.5)] {
+            let matrix = projection(sign, ends, aside, w);
+            let camera = Camera::from_matrices(pose, matrix, depth, None, image)
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert!(camera.is_orthographic());
+            for p in [DVec3::new(2.0, 1.5, 0.0), eye - expected.forward(), eye] {
+                // The middle's offset moves the picture by shares of half its size.
+                let shift = DVec2::new(aside[0] * 320.0, -aside[1] * 240.0);
+                let (a, b) = (camera.pixel(p).unwrap(), expected.pixel(p).unwrap() + shift);
+                assert!(a.distance(b) < 1e-8, "{name}: {a} {b}");
+            }
+            let ends = [camera.near() - near, camera.far() - far];
+            assert!(ends.iter().all(|e| e.abs() < 1e-9), "{name}: {ends:?}");
+            assert!((camera.pixel_width(9.0) * 480.0 / height - 1.0).abs() < 1e-9);
+            let shorter = Camera::from_matrices(pose, matrix, depth, Some(2.0), image).unwrap();
+            assert_eq!(shorter.far(), 2.0);
+            let none = Camera::from_matrices(pose, matrix, depth, Some(near - 1.0), image);
+            assert_eq!(field(none), "camera.shadow_distance");
+        }
+    }
+    let good = projection(-1.0, zero_to_one, [0.0; 2], 1.0);
+    let pose = pose(-expected.forward());
+    let mut sheared = good;
+    sheared.z_axis.x = 0.1;
+    let mut flipped = good;
+    flipped.y_axis.y = -y;
+    for bad in [
+        sheared,
+        flipped,
+        good * 0.0,
+        good * -1.0,
+        DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::ZERO, DVec4::W),
+    ] {
+        let bad = Camera::from_matrices(pose, bad, ClipDepth::ZeroToOne, None, image);
+        assert_eq!(field(bad), "camera.clip_from_view");
+    }
+}
+
+#[test]
+fn orthographic_cameras_name_what_is_wrong() {
+    let LookAt { eye, target, up, near, far, image, .. } = VIEW;
+    let good = Orthographic { eye, target, up, height: 5.0, near, far, image };
+    for (view, name) in [
+        (Orthographic { eye: DVec3::NAN, ..good }, "camera.eye"),
+        (Orthographic { target: eye, ..good }, "camera.target"),
+        (Orthographic { up: DVec3::ZERO, ..good }, "camera.up"),
+        (Orthographic { height: 0.0, ..good }, "camera.height"),
+        (Orthographic { height: -1.0, ..good }, "camera.height"),
+        (Orthographic { height: f64::NAN, ..good }, "camera.height"),
+        (Orthographic { height: f64::INFINITY, ..good }, "camera.height"),
+        (Orthographic { near: f64::NEG_INFINITY, ..good }, "camera.near"),
+        (Orthographic { near: f64::NAN, ..good }, "camera.near"),
+        (Orthographic { far: near, ..good }, "camera.far"),
+        (Orthographic { far: f64::INFINITY, ..good }, "camera.far"),
+        (Orthographic { image: [0, 9], ..good }, "camera.image"),
+    ] {
+        assert_eq!(field(Camera::orthographic(view)), name);
+    }
+    for view in [
+        Orthographic { near: 0.0, ..good },
+        Orthographic { near: -50.0, far: -1.0, ..good },
+        Orthographic { near: -1e12, far: 1e12, height: 1e12, ..good },
+        Orthographic { height: 1e-9, image: [1, 65536], ..good },
+    ] {
+        let camera = Camera::orthographic(view).unwrap();
+        for (name, spread) in WARPS {
+            for light in [SUN, Light::Directional { direction: camera.forward() }] {
+                let partition = possible(Partition::slices(3), spread);
+                let technique = Technique { partition, ..technique(spread) };
+                let mut planner = planner();
+                let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique);
+                let plan = plan.unwrap_or_else(|e| panic!("{name} {view:?}: {e}"));
+                for map in &plan.maps {
+                    let is_finite = map.shadow_from_local.is_finite() && map.error.max.is_finite();
+                    assert!(is_finite, "{name} {view:?}: {map:?}");
+                }
+            }
+        }
+    }
 }
 
 /// An off-centre projection (for one eye of a headset, say) shows what its matrix shows.

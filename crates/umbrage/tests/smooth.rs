@@ -283,7 +283,9 @@ proptest! {
         prop_assume!(!switches);
         for p in config.seen_points(&numbers) {
             for (i, _) in before.lookup(0, p) {
-                let is_side = before.maps[i].part.face.is_some_and(|face| face != Face::Near);
+                // In orthographic views one face serves the whole view.
+                let is_side = !config.camera.is_orthographic()
+                    && before.maps[i].part.face.is_some_and(|face| face != Face::Near);
                 let turns = is_along_light && !is_side;
                 if turns || after.lookup(0, p).all(|(j, _)| i != j) {
                     continue;

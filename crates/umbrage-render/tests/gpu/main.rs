@@ -39,11 +39,10 @@ impl<'a> Set<'a> {
     pub(crate) fn new(scene: &'a Scene, image: [u32; 2]) -> Self {
         let tracer = Tracer::new(scene).unwrap();
         let v = scene.default_view();
-        let look = v.look_at(image);
         let boxes = BoxTree::new(&tracer.boxes(64)).unwrap();
         // Choosing view and light takes seconds in a large scene that brings none.
         let light = scene.light_for_view(&v).light;
-        Self { scene, tracer, camera: Camera::look_at(look).unwrap(), boxes, light }
+        Self { scene, tracer, camera: v.camera(image).unwrap(), boxes, light }
     }
 
     pub(crate) fn light(&self) -> Light {

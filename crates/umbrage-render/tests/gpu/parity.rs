@@ -4,9 +4,11 @@ use crate::{GPU, Set, scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
-use umbrage::{Camera, Light, Plan, Size, SpotLight, Technique};
+use umbrage::{Light, Plan, Size, SpotLight, Technique};
 use umbrage_render::{Renderer, Sample, SceneBuffers, Shading};
-use umbrage_scene::{Alpha, Instance, Material, Mesh, Sampling, Scene, Texture, TextureId, Wrap};
+use umbrage_scene::{
+    Alpha, Instance, Lens, Material, Mesh, Sampling, Scene, Texture, TextureId, Wrap,
+};
 use umbrage_testing::needs;
 use umbrage_trace::{Reference, View};
 use umbrage_wgpu::{Casters, Comparison, Layout, LookupBuffers, ShadowOptions, Support};
@@ -454,12 +456,8 @@ fn every_width(scenes: &[&str]) {
     }
 }
 
-/// A directional, a spot and a point light in one plan, each looked up separately.
-#[needs(gpu)]
-#[test]
-fn several_lights_share_a_plan() {
-    let scene = scene("lantern");
-    let set = Set::new(&scene, IMAGE);
+/// A sun, a spot light at the viewer, and the scene's own bulb.
+fn three_lights(set: &Set<'_>) -> [Light; 3] {
     let bulb = set.light();
     let spot = SpotLight {
         position: set.camera.eye() + DVec3::Y,
@@ -468,17 +466,63 @@ fn several_lights_share_a_plan() {
         near: 0.1,
         range: 60.0,
     };
-    let lights =
-        [Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) }, Light::Spot(spot), bulb];
-    let technique = technique("adaptive+z2@768", Filter::Pcf { n: 2 });
-    let plan = set.plan(&lights, &technique);
+    [Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) }, Light::Spot(spot), bulb]
+}
+
+/// Checks each of several lights of one plan.
+fn agrees_with_lights(name: &str, set: &Set<'_>, lights: &[Light], technique: &Technique) {
+    let plan = set.plan(lights, technique);
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     for (index, light) in lights.iter().enumerate() {
         let shading = Shading { camera: &set.camera, light, light_index: index as u32 };
-        let options = ShadowOptions { filter: plan.filter, ..ShadowOptions::default() };
-        let samples = draw(&set, &plan, &shading, &options, GPU.support());
-        let difference = compare(&set, &plan, (index, light), &samples, &reference);
-        check(&format!("lantern, light {index}"), &technique, &difference);
+        let options = ShadowOptions {
+            filter: plan.filter,
+            buffers: LookupBuffers::for_technique(technique, lights.len()),
+            ..ShadowOptions::default()
+        };
+        let samples = draw(set, &plan, &shading, &options, GPU.support());
+        let difference = compare(set, &plan, (index, light), &samples, &reference);
+        check(&format!("{name}, light {index}"), technique, &difference);
+    }
+}
+
+/// A directional, a spot and a point light in one plan, each looked up separately.
+#[needs(gpu)]
+#[test]
+fn several_lights_share_a_plan() {
+    let scene = scene("lantern");
+    let set = Set::new(&scene, IMAGE);
+    let technique = technique("adaptive+z2@768", Filter::Pcf { n: 2 });
+    agrees_with_lights("lantern", &set, &three_lights(&set), &technique);
+}
+
+/// An orthographic camera whose near plane lies behind the eye, with every kind of light, map and
+/// width.
+#[needs(gpu)]
+#[test]
+fn through_an_orthographic_camera() {
+    let scene = scene("lantern");
+    let mut set = Set::new(&scene, IMAGE);
+    let lights = three_lights(&set);
+    let mut view = scene.default_view();
+    view.eye += (view.target - view.eye) * 0.5;
+    view.lens = Lens::Orthographic { height: view.eye.distance(view.target) };
+    view.near = -0.1 * view.eye.distance(view.target);
+    set.camera = view.camera(IMAGE).unwrap();
+    let blur = Prefilter {
+        statistic: Statistic::Vsm(Vsm::default()),
+        blur: Blur::Width(Width::Pixels(3.0)),
+        half: false,
+    };
+    let spread = Filter::Spread { n: 5, width: Width::Pixels(3.0), pattern: Pattern::Grid };
+    for (index, filter) in [
+        (1, Filter::Hard),
+        (2, Filter::Pcf { n: 2 }),
+        (3, Filter::Hard),
+        (5, spread),
+        (7, Filter::Prefiltered(blur)),
+    ] {
+        agrees_with_lights("lantern", &set, &lights, &small(index, filter));
     }
 }
 
@@ -494,17 +538,10 @@ fn a_million_metres_from_the_origin() {
     }
     let near = crate::scene("pole");
     let mut set = Set::new(&scene, IMAGE);
-    let look = near.default_view();
-    set.camera = Camera::look_at(umbrage::LookAt {
-        eye: look.eye + offset,
-        target: look.target + offset,
-        up: look.up,
-        fov_y_rad: look.fov_y_rad,
-        near: look.near,
-        far: look.far,
-        image: IMAGE,
-    })
-    .unwrap();
+    let mut look = near.default_view();
+    look.eye += offset;
+    look.target += offset;
+    set.camera = look.camera(IMAGE).unwrap();
     let light = near.default_light().light;
     for text in &TECHNIQUES[3..5] {
         let technique = technique(text, Filter::Hard);

@@ -63,7 +63,8 @@ pub const SCENE_BYTES: u64 = 2 << 30;
 /// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
 /// Vertex colours, textures other than that of the base colour, animations, scenes other than the
-/// default one and other extensions are not supported and are left out, also with a notice. Both sides of every surface show, whatever `doubleSided` says.
+/// default one and other extensions are not supported and are left out, also with a notice. Both
+/// sides of every surface show, whatever `doubleSided` says.
 ///
 /// # Errors
 /// The file cannot be read, is cut off, refers to files outside its folder or to pipes or devices,

@@ -102,12 +102,11 @@ fn camera_with(
         log_range(0.01, 10.0),
         log_range(1.001, most_ratio),
         prop_oneof![Just([1280, 720]), Just([512, 512]), Just([300, 900])],
-        orthographic_height(),
     )
-        .prop_map(move |(eye, forward, up, fov, near, ratio, image, height)| {
+        .prop_map(move |(eye, forward, up, fov, near, ratio, image)| {
             let (target, near) = (eye + forward * scale, near * scale);
             let far = (near * ratio).min(1e9);
-            let camera = match height {
+            let camera = match orthographic(fov) {
                 None => {
                     let fov_y_rad = fov.to_radians();
                     Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
@@ -124,11 +123,18 @@ fn camera_with(
         })
 }
 
-/// The height of an orthographic view over its range of depths, and where it begins; `None` for
-/// perspective views.
-fn orthographic_height() -> impl Strategy<Value = Option<(f64, f64)>> {
-    let begin = prop_oneof![2 => Just(1.0), 1 => Just(0.0), 1 => -2.0..1.0f64];
-    proptest::option::weighted(0.4, (log_range(0.01, 100.0), begin))
+/// The height of an orthographic view over its range of depths, and where it begins in units of its
+/// near distance; `None` for perspective views. Both follow from the digits of a random number, so
+/// that the numbers drawn are the same for both kinds.
+fn orthographic(random: f64) -> Option<(f64, f64)> {
+    let share = |from: u32| (random.to_bits() >> from & 0xfff) as f64 / 4096.0;
+    let height = 0.01 * 1e4f64.powf(share(12));
+    let begin = match share(24) {
+        half if half < 0.5 => 1.0,
+        quarter if quarter < 0.75 => 0.0,
+        rest => 12.0 * rest - 11.0,
+    };
+    (share(0) < 0.4).then_some((height, begin))
 }
 
 /// Views as [`camera`] gives, and odd ones: of micrometres and of a hundred thousand kilometres, as
@@ -210,7 +216,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.1..0.9f64, 0.1..0.9, 0.0..1.0], direction(), 2.0..70.0f64, log_range(0.2, 3.0)).prop_map(
         move |([x, y, z], from, half, distance)| {
             let seen = point_in_view(&camera, [x, y, z]);
-            let distance = distance * reach(&camera);
+            let distance = distance * size(&camera);
             Light::Spot(SpotLight {
                 position: seen - from * distance,
                 direction: from,
@@ -226,7 +232,7 @@ fn spot(camera: Camera) -> impl Strategy<Value = Light> {
 fn point(camera: Camera) -> impl Strategy<Value = Light> {
     ([0.0..1.0f64, 0.0..1.0, 0.0..1.0], direction(), log_range(1e-3, 3.0)).prop_map(
         move |(place, away, distance)| {
-            let distance = distance * reach(&camera);
+            let distance = distance * size(&camera);
             Light::Point(PointLight {
                 position: point_in_view(&camera, place) + away * distance,
                 near: (distance * 0.01).max(1e-12),
@@ -268,7 +274,7 @@ fn odd_light(camera: Camera) -> impl Strategy<Value = Light> {
     let suns = prop_oneof![2 => across.boxed(), 1 => along.boxed(), 1 => axis().boxed()]
         .prop_map(|direction| Light::Directional { direction });
     let beside_eye = (direction(), 0.0..20.0f64)
-        .prop_map(move |(d, digits)| camera.eye() + d * (reach(&camera) * 10f64.powf(-digits)));
+        .prop_map(move |(d, digits)| camera.eye() + d * (size(&camera) * 10f64.powf(-digits)));
     let in_plane = ([0.0..1.0f64, 0.0..1.0], 0usize..6).prop_map(move |([u, v], plane)| {
         let [w, h] = camera.image().map(f64::from);
         let [left, right, top, bottom] = [[0.0, u], [1.0, u], [u, 0.0], [u, 1.0]];
@@ -287,7 +293,7 @@ fn odd_light(camera: Camera) -> impl Strategy<Value = Light> {
     let place = prop_oneof![Just(camera.eye()), beside_eye, in_plane];
     let ends = prop_oneof![
         2 => (log_range(1e-6, 0.1), log_range(0.2, 10.0))
-            .prop_map(move |(near, range)| [near, range].map(|share| share * reach(&camera))),
+            .prop_map(move |(near, range)| [near, range].map(|share| share * size(&camera))),
         1 => Just([1e-12, 1e12]),
     ];
     let half_deg = prop_oneof![1.0..90.0f64, Just(90.0)];
@@ -384,6 +390,11 @@ pub(crate) fn point_in_view(camera: &Camera, [x, y, z]: [f64; 3]) -> DVec3 {
 pub(crate) fn detail(camera: &Camera) -> f64 {
     let height = camera.pixel_width(camera.near()) * f64::from(camera.image()[1]);
     if camera.is_orthographic() { height.min(camera.far() - camera.near()) } else { camera.near() }
+}
+
+/// The largest length that matters to a camera's maps, metres.
+pub(crate) fn size(camera: &Camera) -> f64 {
+    if camera.is_orthographic() { reach(camera) } else { camera.far() }
 }
 
 /// The largest distance from the eye at which a camera sees anything, metres.
@@ -552,9 +563,8 @@ pub(crate) fn parts(config: &Config, boxes: &[PartialBox]) -> Vec<Aabb> {
             PartialBox::Empty => Aabb::EMPTY,
             PartialBox::SameAsLast => parts.last().copied().unwrap_or(Aabb::EMPTY),
             PartialBox::OutOfSight => {
-                let size = reach(camera);
-                let behind = camera.eye() - camera.forward() * 3.0 * size;
-                Aabb::new(behind, behind + size * 0.1)
+                let behind = camera.eye() - camera.forward() * 3.0 * size(camera);
+                Aabb::new(behind, behind + size(camera) * 0.1)
             }
         });
     }
@@ -615,7 +625,7 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
                 check(is_most, kind, &|| format!("{error} > {largest} at {p}"))?;
             }
             let reach = match config.light {
-                Light::Directional { .. } => 10.0 * reach(&config.camera),
+                Light::Directional { .. } => 10.0 * size(&config.camera),
                 Light::Spot(spot) => 0.9 * p.distance(spot.position),
                 Light::Point(point) => 0.9 * p.distance(point.position),
             };
