@@ -395,7 +395,7 @@ fn every_width(scenes: &[&str]) {
     }
 }
 
-/// A directional, a spot and a point light in one plan, each looked up separately.
+/// A directional, a spot, a wide spot and a point light in one plan, each looked up separately.
 #[needs(gpu)]
 #[test]
 fn several_lights_share_a_plan() {
@@ -409,8 +409,9 @@ fn several_lights_share_a_plan() {
         near: 0.1,
         range: 60.0,
     };
-    let lights =
-        [Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) }, Light::Spot(spot), bulb];
+    let wide = SpotLight { half_angle_rad: std::f64::consts::FRAC_PI_2, ..spot };
+    let sun = Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) };
+    let lights = [sun, Light::Spot(spot), Light::Spot(wide), bulb];
     let technique = technique("adaptive+z2@768", Filter::Pcf { n: 2 });
     let plan = set.plan(&lights, &technique);
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
