@@ -374,9 +374,11 @@ impl Probe<'_> {
         // logarithmic rows this ratio has light space's own w as a further factor.)
         let mean = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
         let normal = Self::towards_all(mean, corners, &|c| c.normal_t, || {
-            // Under a lamp N = w² ∇t lies within 90° of light space's z for a one-point warp.
-            let t = self.map.shadow_from_local.row(1).truncate();
-            self.axis().map_or(t, |axis| t - axis * axis.dot(t)).normalize_or_zero()
+            // N = w ∇T − T ∇w, where t = T/w. So N · n = w |∇T × ∇w|²/|∇w|² > 0 for the part n of ∇T
+            // across ∇w.
+            let [t, w] = [1, 3].map(|i| self.map.shadow_from_local.row(i).truncate());
+            let w = w.normalize_or_zero();
+            (t - w * w.dot(t)).normalize_or_zero()
         });
         let t = || {
             w_over_z

@@ -395,10 +395,10 @@ fn wide_spots_are_parts_of_point_lights() {
                 let plan = plan_of(light, spread);
                 let whole = plan_of(bulb, spread);
                 assert_eq!(plan.maps.len(), 6, "{name}");
-                assert!(
-                    plan.storage_factor() <= whole.storage_factor() * 1.03,
-                    "{name}, {half_deg}°, {direction}"
-                );
+                let is_less = plan.storage_factor() <= whole.storage_factor() * 1.03;
+                // Other warps follow rules that can need more for a part than for the whole.
+                let is_fixed = spread.cover != Cover::Seen || spread.warp == Warp::Uniform;
+                assert!(is_less || !is_fixed, "{name}, {half_deg}°, {direction}");
                 for (map, of_bulb) in plan.maps.iter().zip(&whole.maps) {
                     assert_eq!(map.part, of_bulb.part);
                     let through = map.part.side.unwrap().direction();
