@@ -49,7 +49,9 @@ fn lamps_are_filtered_as_well_as_compared() {
     });
     let filters: Vec<Filter> =
         filters.chain([Filter::Pcss { n: 4, light: LightSize::Metres(0.05) }]).collect();
-    for light in [Light::Spot(spot), Light::Point(point)] {
+    // A cone that is a half-space has six maps.
+    let wide = SpotLight { half_angle_rad: std::f64::consts::FRAC_PI_2, ..spot };
+    for light in [Light::Spot(spot), Light::Spot(wide), Light::Point(point)] {
         for warp in [Warp::Uniform, Warp::Lispsm] {
             let view = View::new(&tracer, camera, light, 1).unwrap();
             let band = view.band(0..camera.image()[1], &nobody);

@@ -438,6 +438,13 @@ mod tests {
         })
     }
 
+    /// A light into a half-space, which has six maps.
+    fn wide_spot() -> umbrage::Light {
+        let umbrage::Light::Spot(spot) = spot() else { unreachable!("a spot light") };
+        let half_angle_rad = std::f64::consts::FRAC_PI_2;
+        umbrage::Light::Spot(SpotLight { half_angle_rad, ..spot })
+    }
+
     fn bulb() -> umbrage::Light {
         let position = DVec3::new(8.0, 5.0, -2.0);
         umbrage::Light::Point(PointLight { position, near: 0.1, range: 30.0 })
@@ -454,6 +461,7 @@ mod tests {
             (sun(), "adaptive+z3(fitted,overlap=0.2)", 0),
             (sun(), "lispsm+face", 0),
             (spot(), "adaptive+z2", 0),
+            (wide_spot(), "adaptive", 0),
             (bulb(), "adaptive", 0),
         ] {
             let (lookup, _) = filled(light, technique);

@@ -58,7 +58,7 @@ pub enum LookupBuffers {
 
 impl LookupBuffers {
     /// Uniform buffers if they hold the maps that a technique makes for this many lights, even if
-    /// all of them are point lights; otherwise storage buffers.
+    /// all of them are point lights or wide spot lights; otherwise storage buffers.
     pub fn for_technique(technique: &Technique, lights: usize) -> Self {
         const CUBE_SIDES: usize = 6;
         let [faces, face_planes] = match technique.partition.faces {
@@ -66,8 +66,9 @@ impl LookupBuffers {
             Faces::Sides => [4, 3],
             Faces::SidesAndNear => [5, 4],
         };
-        // A pyramid of light has up to six planes. A slice has two ends, and the view has one.
-        let planes = 6 + 2 + 1 + face_planes;
+        // A pyramid of light has up to six planes, and the cone of a wide spot light has four. A slice
+        // has two ends, and the view has one.
+        let planes = 6 + 4 + 2 + 1 + face_planes;
         let of_light = CUBE_SIDES * faces * technique.partition.slices as usize;
         let maps = lights.saturating_mul(of_light);
         let fits = lights <= wgsl::MAX_LIGHTS

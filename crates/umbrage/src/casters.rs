@@ -53,7 +53,8 @@ pub(crate) fn caster_planes(
             let plane = Plane { normal: plane.truncate(), offset: plane.w };
             // The direction of an edge as short as rounding is arbitrary. No plane is better than a
             // wrong one. Corners near a lamp tell as much about a direction as those far from it.
-            let allowed = |p: DVec3| space.apex.map_or(slack, |apex| ASKEW * p.distance(apex));
+            let allowed =
+                |p: DVec3| space.apex.map_or(slack, |apex| slack.min(ASKEW * p.distance(apex)));
             let is_right = |p: DVec3| plane.distance(p) >= -allowed(p);
             if (0..outline.len()).map(corner).all(is_right) {
                 planes.push(widen(plane));

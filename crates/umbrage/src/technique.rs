@@ -146,8 +146,8 @@ pub enum Warp {
         focus: Option<f64>,
     },
     /// The λ that minimises the objective over the receivers seen. The objective is never larger
-    /// than for `Uniform` (under spot lights, with [`Objective::Area`]: larger by one per cent at
-    /// most). Where sin θ < sin φ/4 the warp fades out.
+    /// than for `Uniform` (under spot and point lights, with [`Objective::Area`]: larger by one per
+    /// cent at most). Where sin θ < sin φ/4 the warp fades out.
     ///
     /// For thin strips, such as a slice of a flat floor, two distant values of λ can be nearly
     /// equally good; then λ may jump from one to the other after a small motion.

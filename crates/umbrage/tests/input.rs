@@ -347,6 +347,77 @@ fn odd_input_gives_sound_plans() {
     }
 }
 
+/// Where light falls almost exactly across a rolled camera, its image after the viewer's perspective
+/// lies at infinity but for rounding, however small the rest is.
+#[test]
+fn a_light_almost_across_the_view_is_planned() {
+    for tiny in (0..310).map(|digits| 10f64.powi(-digits)).chain([0.0]) {
+        let rolled = LookAt { up: DVec3::new(-0.59, 0.29, -0.75), ..VIEW };
+        let level = LookAt { target: VIEW.eye + DVec3::new(4.0, 0.0, -3.0), ..rolled };
+        let camera = Camera::look_at(level).unwrap();
+        let across = camera.forward().cross(DVec3::X).normalize();
+        for direction in [
+            DVec3::new(-tiny, -1.0, 0.5 * tiny),
+            across + camera.forward() * tiny,
+            across - camera.forward() * tiny,
+        ] {
+            let sun = Light::Directional { direction };
+            let mut planner = planner();
+            let plan = planner.plan(&camera, &[sun], &Bounds::default(), &technique(Warp::Psm));
+            let plan = plan.unwrap();
+            check_sound(plan, Size::Budget(1 << 20), &format!("{direction}"));
+            let p = common::point_in_view(&camera, [0.3, 0.4, 0.5]);
+            let shadow = plan.maps[0].project(p).unwrap();
+            assert!(shadow.cmpge(DVec3::ZERO).all() && shadow.cmple(DVec3::ONE).all(), "{shadow}");
+        }
+    }
+}
+
+/// A wide spot light has six maps, those of a point light as far as they lie in its cone, also where
+/// its cone is a half-space. What it does not light needs no texels.
+#[test]
+fn wide_spots_are_parts_of_point_lights() {
+    let camera = Camera::look_at(VIEW).unwrap();
+    let floor = Aabb::new(DVec3::new(-20.0, 0.0, -40.0), DVec3::new(30.0, 8.0, 20.0));
+    let bounds = Bounds::of_scene(floor);
+    let narrow = SpotLight { half_angle_rad: 75f64.to_radians(), ..SPOT };
+    let plan_of = |light: Light, spread| {
+        planner().plan(&camera, &[light], &bounds, &technique(spread)).unwrap().clone()
+    };
+    let SpotLight { position, near, range, .. } = SPOT;
+    let bulb = Light::Point(PointLight { position, near, range });
+    assert_eq!(plan_of(Light::Spot(narrow), Warp::Uniform.into()).maps.len(), 1);
+    for half_deg in [75.01f64, 80.0, 89.9, 90.0] {
+        for direction in [DVec3::NEG_Y, DVec3::Y, DVec3::X, DVec3::new(1.0, -0.1, 1.0)] {
+            let spot = SpotLight { direction, half_angle_rad: half_deg.to_radians(), ..SPOT };
+            for (name, spread) in WARPS {
+                let light = Light::Spot(spot);
+                let plan = plan_of(light, spread);
+                let whole = plan_of(bulb, spread);
+                assert_eq!(plan.maps.len(), 6, "{name}");
+                let is_less = plan.storage_factor() <= whole.storage_factor() * 1.03;
+                // Other warps follow rules that can need more for a part than for the whole.
+                let is_fixed = spread.cover != Cover::Seen || spread.warp == Warp::Uniform;
+                assert!(is_less || !is_fixed, "{name}, {half_deg}°, {direction}");
+                for (map, of_bulb) in plan.maps.iter().zip(&whole.maps) {
+                    assert_eq!(map.part, of_bulb.part);
+                    let through = map.part.side.unwrap().direction();
+                    // The corners of a cube's side are at 54.7° from its middle.
+                    let off = direction.angle_between(through).to_degrees() - 54.8;
+                    assert!(map.is_empty() || off < half_deg, "{name}: {:?} is not lit", map.part);
+                }
+                for (x, y) in [(100.0, 300.0), (320.0, 250.0), (600.0, 400.0), (30.0, 470.0)] {
+                    let ray = camera.ray(DVec2::new(x, y));
+                    let p = VIEW.eye + ray * (VIEW.eye.y / -ray.y);
+                    if ray.y < 0.0 && light.reaches(p) && camera.depth(p) < VIEW.far {
+                        assert_eq!(plan.lookup(0, p).count(), 1, "{name}, {half_deg}°: {p}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 fn check_sound(plan: &Plan, size: Size, what: &str) {
     assert!(plan.lights.iter().all(|l| l.theta_rad.is_finite()), "{what}");
     assert!(plan.storage_factor().is_finite(), "{what}");

@@ -456,8 +456,8 @@ fn every_width(scenes: &[&str]) {
     }
 }
 
-/// A sun, a spot light at the viewer, and the scene's own bulb.
-fn three_lights(set: &Set<'_>) -> [Light; 3] {
+/// A sun, a spot light at the viewer, a wide one there, and the scene's own bulb.
+fn four_lights(set: &Set<'_>) -> [Light; 4] {
     let bulb = set.light();
     let spot = SpotLight {
         position: set.camera.eye() + DVec3::Y,
@@ -466,7 +466,9 @@ fn three_lights(set: &Set<'_>) -> [Light; 3] {
         near: 0.1,
         range: 60.0,
     };
-    [Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) }, Light::Spot(spot), bulb]
+    let wide = SpotLight { half_angle_rad: std::f64::consts::FRAC_PI_2, ..spot };
+    let sun = Light::Directional { direction: DVec3::new(0.4, -1.0, -0.3) };
+    [sun, Light::Spot(spot), Light::Spot(wide), bulb]
 }
 
 /// Checks each of several lights of one plan.
@@ -486,14 +488,14 @@ fn agrees_with_lights(name: &str, set: &Set<'_>, lights: &[Light], technique: &T
     }
 }
 
-/// A directional, a spot and a point light in one plan, each looked up separately.
+/// A directional, a spot, a wide spot and a point light in one plan, each looked up separately.
 #[needs(gpu)]
 #[test]
 fn several_lights_share_a_plan() {
     let scene = scene("lantern");
     let set = Set::new(&scene, IMAGE);
     let technique = technique("adaptive+z2@768", Filter::Pcf { n: 2 });
-    agrees_with_lights("lantern", &set, &three_lights(&set), &technique);
+    agrees_with_lights("lantern", &set, &four_lights(&set), &technique);
 }
 
 /// An orthographic camera whose near plane lies behind the eye, with every kind of light, map and
@@ -503,7 +505,7 @@ fn several_lights_share_a_plan() {
 fn through_an_orthographic_camera() {
     let scene = scene("lantern");
     let mut set = Set::new(&scene, IMAGE);
-    let lights = three_lights(&set);
+    let lights = four_lights(&set);
     let mut view = scene.default_view();
     view.eye += (view.target - view.eye) * 0.5;
     view.lens = Lens::Orthographic { height: view.eye.distance(view.target) };

@@ -632,8 +632,8 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
             let caster = p + config.light.direction_to_light(p) * reach;
             let casts = map.project(caster).ok_or_else(|| nothing("no caster", caster))?;
             // Under a spot light, texels are up to ten times narrower at the caster.
-            let metres = 3e-14 * (config.camera.eye().length() + reach);
-            let texels = [error.s, error.t].map(|e| 1e-4 + metres / (e * pixel));
+            let metres = 1e-13 * (config.camera.eye().length() + reach);
+            let texels = [error.s, error.t].map(|e| 1e-3 + metres / (e * pixel));
             let off = [(casts - shadow).x * res_s, (casts - shadow).y * res_t];
             let is_same = (0..2).all(|i| off[i].abs() < texels[i]);
             check(is_same, "caster's texel", &|| format!("{casts} from {shadow} at {p}"))?;
@@ -646,7 +646,7 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
             }
             let beam = map.beam(shadow.truncate()).ok_or_else(|| nothing("no beam", shadow))?;
             let off = (p - beam.origin).reject_from_normalized(beam.direction).length();
-            let most = 1e-5 * pixel + 1e-5 * error.worst * pixel + 10.0 * rounding;
+            let most = 1e-5 * pixel + 1e-3 * error.worst * pixel + 10.0 * rounding;
             check(off <= most, "beam", &|| format!("misses by {off} of {most}"))?;
         }
     }
