@@ -100,7 +100,7 @@ fn vertex_alpha_counts_where_materials_are_masked() {
     assert_eq!(with_text(&scene, "only their alpha is used").len(), 1);
     let scene = float([-1.0, 7.0, f32::NAN]).load().unwrap();
     assert_eq!(scene.meshes[0].alphas, [0.0, 1.0, 1.0]);
-    assert_eq!(with_text(&scene, "1 alphas of vertices are not finite").len(), 1);
+    assert_eq!(with_text(&scene, "3 alphas of vertices are not within 0 and 1").len(), 1);
     // Alphas of 1 change nothing, and colours without alpha have 1.
     assert_eq!(float([1.0; 3]).load().unwrap().meshes[0].alphas, [0.0; 0]);
     let scene = colored("VEC3", 5126, false, &bytes(&[0.5; 9])).load().unwrap();
@@ -413,6 +413,14 @@ fn what_is_not_read_is_told_once_a_kind() {
     }
     file.json["materials"][0]["normalTexture"] = json!({"index": 0});
     file.json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    file.json["materials"][0]["emissiveFactor"] = json!([0, 0, 1]);
+    file.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([3, 1, 1, 1]);
+    file.json["samplers"][0]["wrapS"] = json!(7);
+    let perspective = json!({"yfov": 1, "znear": 0.1, "zfar": 100, "aspectRatio": 2});
+    file.push("cameras", json!({"type": "perspective", "perspective": perspective}));
+    file.json["nodes"][1]["camera"] = json!(0);
+    file.json["nodes"][1]["rotation"] = json!([0, 2, 0, 2]);
+    file.push("nodes", json!({"matrix": glam::Mat4::IDENTITY.to_cols_array(), "scale": [1, 2, 1]}));
     let animation = json!({"channels": [], "samplers": []});
     file.json["animations"] = json!([animation, animation, animation]);
     file.json["extensionsUsed"] = json!([
@@ -437,8 +445,14 @@ fn what_is_not_read_is_told_once_a_kind() {
              are drawn without what they describe",
             "extensionsUsed: MSFT_lod, EXT_made_up: not supported: what they describe is left out",
             "animations[0] and 2 more: not played, nodes stay in the pose they have",
+            "cameras[0]: aspectRatio is not used, the picture's size decides",
             "scenes[1] and 1 more: left out, only the default scene is shown",
+            "nodes[2]: has a matrix beside translation, rotation or scale, the matrix counts",
+            "nodes[1].rotation: is no unit quaternion, its direction counts",
+            "materials[0]: baseColorFactor is not within 0 and 1, the nearest colour instead",
             "materials[0]: textures other than that of the base colour are not drawn",
+            "materials[0]: the light that it emits is not drawn",
+            "samplers[0]: has an unknown filter or wrapping mode, linear and repeated instead",
             "meshes[0].primitives[0] and 1 more: has several sets of vertex colours, only the first \
              counts",
             "meshes[0].primitives[0] and 1 more: has attributes of its application's own, which \
