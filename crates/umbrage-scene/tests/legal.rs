@@ -125,7 +125,7 @@ fn vertex_alpha_counts_where_materials_are_masked() {
 
 /// The triangle shown, and below a hidden node another triangle with a light and a camera on one
 /// node.
-fn hidden(visible: Value) -> File {
+fn hidden(visible: &Value) -> File {
     let lights = json!([{"type": "point"}, {"type": "point", "name": "shown"}]);
     let mut file = lit_by(&lights);
     file.json["scenes"][0]["nodes"] = json!([0, 2, 3]);
@@ -144,21 +144,21 @@ fn hidden(visible: Value) -> File {
 
 #[test]
 fn hidden_nodes_are_not_there_with_all_below_them() {
-    let scene = hidden(json!(false)).load().unwrap();
+    let scene = hidden(&json!(false)).load().unwrap();
     assert_eq!((scene.instances.len(), notices(&scene)), (1, vec![]));
     let lights: Vec<&str> = scene.lights.iter().map(|l| l.name.as_str()).collect();
     assert_eq!(lights, ["shown"]);
     // The extension says that it does not affect cameras.
     assert_eq!(scene.cameras.len(), 1);
     for visible in [json!(true), Value::Null] {
-        let mut file = hidden(visible.clone());
+        let mut file = hidden(&visible);
         if visible.is_null() {
             file.json["nodes"][3]["extensions"] = json!({"KHR_node_visibility": {}});
         }
         let scene = file.load().unwrap();
         assert_eq!((scene.instances.len(), scene.lights.len()), (2, 2), "{visible}");
     }
-    let error = hidden(json!("no")).error();
+    let error = hidden(&json!("no")).error();
     let place = "nodes[3].extensions.KHR_node_visibility.visible: must be true or false";
     assert_eq!(error, place);
     // Joints move a mesh whether they show or not.

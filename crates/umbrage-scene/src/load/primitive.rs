@@ -311,7 +311,8 @@ fn load_influences(
             }
             (None, None) => break,
             _ => {
-                notices.add(place, "has joints without weights or weights without joints, left out")
+                let told = "has joints without weights or weights without joints, left out";
+                notices.add(place, told);
             }
         }
     }
