@@ -6,12 +6,13 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum SceneError {
     /// A file could not be read.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {problem}", .path.display())]
     Read {
         /// Path of the scene, or of the buffer or image that the scene refers to.
         path: PathBuf,
-        /// The error of the operating system.
-        source: std::io::Error,
+        /// The error of the operating system. It is part of the message and therefore no source,
+        /// which would repeat it.
+        problem: std::io::Error,
     },
     /// The file breaks a rule of glTF 2.0 that has no safe repair.
     #[error("{}: {place}: {problem}", .path.display())]

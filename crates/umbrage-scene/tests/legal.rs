@@ -100,7 +100,7 @@ fn vertex_alpha_counts_where_materials_are_masked() {
     assert_eq!(with_text(&scene, "only their alpha is used").len(), 1);
     let scene = float([-1.0, 7.0, f32::NAN]).load().unwrap();
     assert_eq!(scene.meshes[0].alphas, [0.0, 1.0, 1.0]);
-    assert_eq!(with_text(&scene, "1 alphas of vertices are not finite").len(), 1);
+    assert_eq!(with_text(&scene, "3 alphas of vertices are not within 0 and 1").len(), 1);
     // Alphas of 1 change nothing, and colours without alpha have 1.
     assert_eq!(float([1.0; 3]).load().unwrap().meshes[0].alphas, [0.0; 0]);
     let scene = colored("VEC3", 5126, false, &bytes(&[0.5; 9])).load().unwrap();
@@ -125,7 +125,7 @@ fn vertex_alpha_counts_where_materials_are_masked() {
 
 /// The triangle shown, and below a hidden node another triangle with a light and a camera on one
 /// node.
-fn hidden(visible: Value) -> File {
+fn hidden(visible: &Value) -> File {
     let lights = json!([{"type": "point"}, {"type": "point", "name": "shown"}]);
     let mut file = lit_by(&lights);
     file.json["scenes"][0]["nodes"] = json!([0, 2, 3]);
@@ -144,21 +144,21 @@ fn hidden(visible: Value) -> File {
 
 #[test]
 fn hidden_nodes_are_not_there_with_all_below_them() {
-    let scene = hidden(json!(false)).load().unwrap();
+    let scene = hidden(&json!(false)).load().unwrap();
     assert_eq!((scene.instances.len(), notices(&scene)), (1, vec![]));
     let lights: Vec<&str> = scene.lights.iter().map(|l| l.name.as_str()).collect();
     assert_eq!(lights, ["shown"]);
     // The extension says that it does not affect cameras.
     assert_eq!(scene.cameras.len(), 1);
     for visible in [json!(true), Value::Null] {
-        let mut file = hidden(visible.clone());
+        let mut file = hidden(&visible);
         if visible.is_null() {
             file.json["nodes"][3]["extensions"] = json!({"KHR_node_visibility": {}});
         }
         let scene = file.load().unwrap();
         assert_eq!((scene.instances.len(), scene.lights.len()), (2, 2), "{visible}");
     }
-    let error = hidden(json!("no")).error();
+    let error = hidden(&json!("no")).error();
     let place = "nodes[3].extensions.KHR_node_visibility.visible: must be true or false";
     assert_eq!(error, place);
     // Joints move a mesh whether they show or not.
@@ -413,6 +413,14 @@ fn what_is_not_read_is_told_once_a_kind() {
     }
     file.json["materials"][0]["normalTexture"] = json!({"index": 0});
     file.json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    file.json["materials"][0]["emissiveFactor"] = json!([0, 0, 1]);
+    file.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([3, 1, 1, 1]);
+    file.json["samplers"][0]["wrapS"] = json!(7);
+    let perspective = json!({"yfov": 1, "znear": 0.1, "zfar": 100, "aspectRatio": 2});
+    file.push("cameras", json!({"type": "perspective", "perspective": perspective}));
+    file.json["nodes"][1]["camera"] = json!(0);
+    file.json["nodes"][1]["rotation"] = json!([0, 2, 0, 2]);
+    file.push("nodes", json!({"matrix": glam::Mat4::IDENTITY.to_cols_array(), "scale": [1, 2, 1]}));
     let animation = json!({"channels": [], "samplers": []});
     file.json["animations"] = json!([animation, animation, animation]);
     file.json["extensionsUsed"] = json!([
@@ -437,8 +445,14 @@ fn what_is_not_read_is_told_once_a_kind() {
              are drawn without what they describe",
             "extensionsUsed: MSFT_lod, EXT_made_up: not supported: what they describe is left out",
             "animations[0] and 2 more: not played, nodes stay in the pose they have",
+            "cameras[0]: aspectRatio is not used, the picture's size decides",
             "scenes[1] and 1 more: left out, only the default scene is shown",
+            "nodes[2]: has a matrix beside translation, rotation or scale, the matrix counts",
+            "nodes[1].rotation: is no unit quaternion, its direction counts",
+            "materials[0]: baseColorFactor is not within 0 and 1, the nearest colour instead",
             "materials[0]: textures other than that of the base colour are not drawn",
+            "materials[0]: the light that it emits is not drawn",
+            "samplers[0]: has an unknown filter or wrapping mode, linear and repeated instead",
             "meshes[0].primitives[0] and 1 more: has several sets of vertex colours, only the first \
              counts",
             "meshes[0].primitives[0] and 1 more: has attributes of its application's own, which \

@@ -213,6 +213,20 @@ fn missing_and_broken_images_leave_materials_plain() {
         assert_eq!(scene.materials[0].base_color_texture, None, "{image}");
         assert!(notices(&scene)[0].starts_with("images[0]: left out"), "{:?}", notices(&scene));
     }
+    // Many of them get one notice, which has the first one's reason.
+    let mut file = masked().set("/images/0", json!({"uri": "none.png"}));
+    for i in 1..4 {
+        file.push("images", json!({"uri": format!("none{i}.png")}));
+        file.push("textures", json!({"source": i}));
+        let look = json!({"baseColorTexture": {"index": i}});
+        file.push("materials", json!({"pbrMetallicRoughness": look}));
+        let mut primitive = file.primitive().clone();
+        primitive["material"] = json!(i);
+        file.json["meshes"][0]["primitives"].as_array_mut().unwrap().push(primitive);
+    }
+    let scene = file.load().unwrap();
+    let [notice] = notices(&scene)[..] else { panic!("{:?}", notices(&scene)) };
+    assert!(notice.starts_with("images[0] and 3 more: left out") && notice.contains("none.png"));
 }
 
 #[test]
@@ -541,6 +555,8 @@ fn pipes_and_devices_are_refused_at_once() {
         let error = load(path).unwrap_err();
         assert!(matches!(error, SceneError::Read { .. }), "{error}");
         assert!(error.to_string().ends_with("is not a regular file"), "{error}");
+        // Whoever prints the chain of causes does not repeat it.
+        assert!(std::error::Error::source(&error).is_none());
     }
     let path = masked().set("/images/0", json!({"uri": "pipe"})).write(folder.path());
     let scene = load(&path).unwrap();

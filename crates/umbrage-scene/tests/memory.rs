@@ -70,7 +70,7 @@ fn instances_out_of_nothing_are_counted_before_they_are_made() {
     let _alone = alone();
     let error = too_large(copies(1 << 26), umbrage_scene::SCENE_BYTES);
     let said = "nodes[0]: with 67108864 instances the scene would take \
-                 6657 MiB, it may take at most 2048 MiB";
+                 32769 MiB, it may take at most 2048 MiB";
     assert!(error.ends_with(said), "{error}");
     // Each primitive of a mesh has instances of its own.
     let mut file = copies(10_000);
@@ -111,7 +111,7 @@ fn meshes_that_share_data_count_each() {
 
     // Each node that draws a skinned mesh has a mesh of its own.
     let mut file = skinned();
-    let indices = file.u16s("SCALAR", &[0, 1, 2].repeat(300));
+    let indices = file.u16s("SCALAR", &[0, 1, 2].repeat(3000));
     file.primitive()["indices"] = json!(indices);
     let node = file.json["nodes"][0].clone();
     let nodes: Vec<usize> = (0..3000).map(|_| file.push("nodes", node.clone())).collect();

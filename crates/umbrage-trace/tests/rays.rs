@@ -283,7 +283,7 @@ fn masks_cut_holes() {
 #[test]
 fn nearest_pixels_are_exact_rectangles() {
     const N: u32 = 4;
-    let is_solid = |x: u32, y: u32| (x * 5 + y * 3) % 7 % 2 == 0;
+    let is_solid = |x: u32, y: u32| (x * 5 + y * 3) % 7 > 3;
     let pixels = || (0..N * N).map(|i| (i % N, i / N));
     let mut cut = scene(vec![sheet(Vec3::ZERO, Vec3::X, Vec3::Z)], &[(0, at(5.0, 1.0, 0.0))]);
     cut.textures.push(Texture {

@@ -46,8 +46,8 @@ impl<'a> Budget<'a> {
         Ok(())
     }
 
-    /// Makes room for `more` things in a list, whose memory is taken while it grows. It grows by
-    /// half or more, if that fits.
+    /// Makes room for `more` things in a list, each of which counts `size` bytes. While the list
+    /// grows, its old memory counts beside the new. It grows by half or more, if that fits.
     ///
     /// # Errors
     /// [`SceneError::TooLarge`] if the list does not fit.
@@ -57,6 +57,7 @@ impl<'a> Budget<'a> {
         list: &mut Vec<T>,
         more: u64,
         what: &str,
+        size: usize,
     ) -> Result<(), SceneError> {
         let (old, needed) = (list.capacity() as u64, (list.len() as u64).saturating_add(more));
         if needed <= old {
@@ -64,10 +65,10 @@ impl<'a> Budget<'a> {
         }
         let roomy = needed.max(old + old / 2);
         // The old memory is given back when all has moved to the new.
-        let take = |capacity| self.take(place, capacity, what, size_of::<T>()).map(|()| capacity);
+        let take = |capacity| self.take(place, capacity, what, size).map(|()| capacity);
         let capacity = take(roomy).or_else(|_| take(needed))?;
         list.reserve_exact(capacity as usize - list.len());
-        self.taken.set(self.taken.get() - old * size_of::<T>() as u64);
+        self.taken.set(self.taken.get() - old * size as u64);
         Ok(())
     }
 

@@ -224,7 +224,7 @@ pub(super) fn read_file(
     budget: &Budget<'_>,
     place: &str,
 ) -> Result<Vec<u8>, SceneError> {
-    let fail = |source| SceneError::Read { path: path.into(), source };
+    let fail = |problem| SceneError::Read { path: path.into(), problem };
     let check = |metadata: Metadata| match metadata.is_file() {
         true => Ok(metadata.len()),
         false => Err(fail(std::io::Error::other("is not a regular file"))),
@@ -250,6 +250,8 @@ pub(super) struct Notices {
 struct Entry {
     what: String,
     first: String,
+    /// Why it was at the first place; empty if that is always the same.
+    why: String,
     places: usize,
     items: usize,
 }
@@ -257,17 +259,23 @@ struct Entry {
 impl Notices {
     /// Notes a repair of one thing at `place`.
     pub(super) fn add(&mut self, place: impl Display, what: impl Into<String>) {
-        self.count(place, 0, what);
+        self.count(place, 0, what, "");
+    }
+
+    /// Notes a repair of one thing at `place`, whose reason differs from place to place. That of the
+    /// first place is told.
+    pub(super) fn add_because(&mut self, place: impl Display, what: &str, why: &str) {
+        self.count(place, 0, what, why);
     }
 
     /// Notes a repair of `items` things at `place`; notes nothing if `items` is 0.
     pub(super) fn add_some(&mut self, place: impl Display, items: usize, what: &str) {
         if items > 0 {
-            self.count(place, items, what);
+            self.count(place, items, what, "");
         }
     }
 
-    fn count(&mut self, place: impl Display, items: usize, what: impl Into<String>) {
+    fn count(&mut self, place: impl Display, items: usize, what: impl Into<String>, why: &str) {
         let what = what.into();
         match self.entries.iter_mut().find(|e| e.what == what) {
             Some(e) => {
@@ -276,7 +284,7 @@ impl Notices {
             }
             None => {
                 let first = place.to_string();
-                self.entries.push(Entry { what, first, places: 1, items });
+                self.entries.push(Entry { what, first, why: why.into(), places: 1, items });
             }
         }
     }
@@ -288,7 +296,8 @@ impl Notices {
                 n => format!(" and {} more", n - 1),
             };
             let items = if e.items > 0 { format!("{} ", e.items) } else { String::new() };
-            Notice(format!("{}{others}: {items}{}", e.first, e.what))
+            let why = if e.why.is_empty() { String::new() } else { format!(": {}", e.why) };
+            Notice(format!("{}{others}: {items}{}{why}", e.first, e.what))
         };
         self.entries.into_iter().map(sentence).collect()
     }

@@ -131,6 +131,10 @@ fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine
     let fail =
         |field: &str, problem: &str| Err(document.invalid(&format!("nodes[{i}].{field}"), problem));
     if let Some(m) = node.matrix {
+        if node.translation.is_some() || node.rotation.is_some() || node.scale.is_some() {
+            let told = "has a matrix beside translation, rotation or scale, the matrix counts";
+            notices.add(format!("nodes[{i}]"), told);
+        }
         return affine(document, m, &format!("nodes[{i}].matrix"), notices);
     }
     let vector =
@@ -146,6 +150,10 @@ fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine
     }
     if !(rotation.is_finite() && rotation.length() > 1e-6) {
         return fail("rotation", "is no rotation: it must be a unit quaternion");
+    }
+    if (rotation.length() - 1.0).abs() > DUST {
+        let place = format!("nodes[{i}].rotation");
+        notices.add(place, "is no unit quaternion, its direction counts");
     }
     Ok(DAffine3::from_scale_rotation_translation(scale, rotation.normalize(), translation))
 }

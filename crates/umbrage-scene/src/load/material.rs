@@ -88,13 +88,15 @@ impl Materials {
                 Alpha::Mask { cutoff: 0.5 }
             }
         };
+        let base_color = factor.clamp(Vec4::ZERO, Vec4::ONE);
+        if base_color != factor {
+            notices
+                .add(&place, "baseColorFactor is not within 0 and 1, the nearest colour instead");
+        }
         let mut material = Material {
             alpha,
             double_sided: json.double_sided,
-            ..plain(
-                &json.name.clone().unwrap_or(place.clone()),
-                factor.clamp(Vec4::ZERO, Vec4::ONE),
-            )
+            ..plain(&json.name.clone().unwrap_or(place.clone()), base_color)
         };
         let others = [
             json.normal_texture.is_some(),
@@ -104,6 +106,9 @@ impl Materials {
         ];
         if others.contains(&true) {
             notices.add(&place, "textures other than that of the base colour are not drawn");
+        }
+        if json.emissive_factor.0 != [0.0; 3] {
+            notices.add(&place, "the light that it emits is not drawn");
         }
         let mut coords = None;
         if let Some(info) = &pbr.base_color_texture {
@@ -152,7 +157,7 @@ impl Materials {
             }
             Err(problem) => {
                 document.budget.give_back_to(taken);
-                notices.add(&place, format!("left out, its materials are plain: {problem}"));
+                notices.add_because(&place, "left out, its materials are plain", &problem);
                 None
             }
         };
@@ -185,6 +190,15 @@ fn sampling(sampler: &Sampler, place: &str, notices: &mut Notices) -> Sampling {
         )
         | Checked::Invalid => Sampling::Linear,
     });
+    let unknown = [
+        sampler.mag_filter == Some(Checked::Invalid),
+        sampler.min_filter == Some(Checked::Invalid),
+        sampler.wrap_s == Checked::Invalid,
+        sampler.wrap_t == Checked::Invalid,
+    ];
+    if unknown.contains(&true) {
+        notices.add(place, "has an unknown filter or wrapping mode, linear and repeated instead");
+    }
     if magnified.zip(minified).is_some_and(|(a, b)| a != b) {
         notices.add(place, "minFilter is not used, magFilter counts at every distance");
     }

@@ -15,7 +15,7 @@ mod uri;
 use crate::error::SceneError;
 use crate::nodes::SceneNode;
 use crate::sky;
-use crate::types::{Alpha, Instance, Scene};
+use crate::types::{Alpha, Instance, Mesh, Scene};
 use budget::Budget;
 use document::{Document, Notices};
 use glam::{DAffine3, DMat3};
@@ -33,10 +33,15 @@ use umbrage::Aabb;
 /// Largest distance of a position from the origin, metres. The planner has the same limit.
 const WORLD_END: f64 = 1e12;
 
-/// The memory that [`load`] lets a scene take, bytes: 2 GiB. That is enough for twenty million
-/// instances, forty million triangles, or two images of 16 384 × 16 384 pixels less what else there
-/// is.
+/// The memory that [`load`] lets a scene take, bytes: 2 GiB. That is enough for four million
+/// instances, some twenty million triangles, or an image of 16 384 × 16 384 pixels and as much
+/// again.
 pub const SCENE_BYTES: u64 = 2 << 30;
+
+/// What an instance counts, bytes. It takes a fifth of that itself. A few bytes of a file can make
+/// any number of instances, and whoever draws or traces them keeps more for each, so what these need
+/// counts too.
+const INSTANCE_BYTES: usize = 512;
 
 /// Reads a scene from a `.gltf` or `.glb` file; the content tells which of the two it is.
 ///
@@ -62,9 +67,9 @@ pub const SCENE_BYTES: u64 = 2 << 30;
 /// - Matrices whose last row is off by rounding, and a byte order mark, are put right.
 /// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
-/// Vertex colours, textures other than that of the base colour, animations, scenes other than the
-/// default one and other extensions are not supported and are left out, also with a notice. Both
-/// sides of every surface show, whatever `doubleSided` says.
+/// Vertex colours, emission, textures other than that of the base colour, animations, scenes other
+/// than the default one and other extensions are not supported and are left out, also with a notice.
+/// Both sides of every surface show, whatever `doubleSided` says.
 ///
 /// # Errors
 /// The file cannot be read, is cut off, refers to files outside its folder or to pipes or devices,
@@ -135,6 +140,14 @@ fn note_unread(document: &Document, notices: &mut Notices) {
     for i in 0..document.root.animations.len() {
         notices.add(format!("animations[{i}]"), "not played, nodes stay in the pose they have");
     }
+    for (i, camera) in document.root.cameras.iter().enumerate() {
+        if camera.perspective.as_ref().is_some_and(|p| p.aspect_ratio.is_some()) {
+            notices.add(
+                format!("cameras[{i}]"),
+                "aspectRatio is not used, the picture's size decides",
+            );
+        }
+    }
     let shown = document.root.scene.map_or(0, |scene| scene.value());
     for i in (0..document.root.scenes.len()).filter(|&i| i != shown) {
         notices.add(format!("scenes[{i}]"), "left out, only the default scene is shown");
@@ -197,7 +210,8 @@ impl Loader<'_> {
             let instances =
                 posed.into_iter().map(|(mesh, world_from_mesh)| Instance { mesh, world_from_mesh });
             let list = &mut self.scene.instances;
-            document.budget.grow(&place, list, instances.len() as u64, "instances")?;
+            let count = instances.len() as u64;
+            document.budget.grow(&place, list, count, "instances", INSTANCE_BYTES)?;
             list.extend(instances);
             return Ok(());
         }
@@ -214,7 +228,8 @@ impl Loader<'_> {
         let world_from_node = hierarchy.world_from_node[index];
         let count = Copies::count(document, node, &place)?;
         let instances = count.unwrap_or(1).saturating_mul(meshes.len() as u64);
-        document.budget.grow(&place, &mut self.scene.instances, instances, "instances")?;
+        let list = &mut self.scene.instances;
+        document.budget.grow(&place, list, instances, "instances", INSTANCE_BYTES)?;
         let taken = document.budget.taken();
         let load = |count| Copies::load(document, node, &place, count as usize);
         let copies = count.map(load).transpose()?;
@@ -263,7 +278,8 @@ impl Loader<'_> {
             let Some(mut loaded) = loaded else { continue };
             let mesh = &mut loaded.mesh;
             document.budget.take(&place, 1, "mesh", mesh.bytes())?;
-            document.budget.grow(&place, &mut self.scene.meshes, 1, "meshes")?;
+            let list = &mut self.scene.meshes;
+            document.budget.grow(&place, list, 1, "meshes", size_of::<Mesh>())?;
             let world_from_mesh = match joints {
                 Some(joints) if !loaded.influences.is_empty() => {
                     let influences = &loaded.influences;

@@ -281,10 +281,11 @@ fn load_alphas(
     if colors.iter().any(|[r, g, b, _]| [r, g, b].iter().any(|c| **c != 1.0)) {
         notices.add(place, "vertex colours are not shown, only their alpha is used");
     }
-    let broken = colors.iter().filter(|[.., alpha]| !alpha.is_finite()).count();
-    notices.add_some(place_of_colors, broken, "alphas of vertices are not finite, 1 instead");
-    let alpha =
-        |&[.., alpha]: &[f32; 4]| if alpha.is_finite() { alpha.clamp(0.0, 1.0) } else { 1.0 };
+    let is_valid = |alpha: &f32| (0.0..=1.0).contains(alpha);
+    let broken = colors.iter().filter(|[.., alpha]| !is_valid(alpha)).count();
+    let told = "alphas of vertices are not within 0 and 1, the nearest value or 1 instead";
+    notices.add_some(place_of_colors, broken, told);
+    let alpha = |&[.., alpha]: &[f32; 4]| if alpha.is_nan() { 1.0 } else { alpha.clamp(0.0, 1.0) };
     let alphas: Vec<f32> = colors.iter().map(alpha).collect();
     Ok(if alphas.iter().all(|&a| a == 1.0) { Vec::new() } else { alphas })
 }
@@ -310,7 +311,8 @@ fn load_influences(
             }
             (None, None) => break,
             _ => {
-                notices.add(place, "has joints without weights or weights without joints, left out")
+                let told = "has joints without weights or weights without joints, left out";
+                notices.add(place, told);
             }
         }
     }

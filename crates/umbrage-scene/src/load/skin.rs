@@ -48,7 +48,7 @@ pub(super) fn pose(
     notices: &mut Notices,
 ) -> Result<DAffine3, SceneError> {
     let origin = joints.first().map_or(DVec3::ZERO, |j| j.translation);
-    let mut unbound = 0;
+    let (mut unbound, mut scaled) = (0, 0);
     for i in 0..mesh.positions.len() {
         let mut blend = DAffine3::from_mat3_translation(DMat3::ZERO, DVec3::ZERO);
         let mut sum = 0.0;
@@ -70,6 +70,8 @@ pub(super) fn pose(
             blend = joints.first().copied().unwrap_or(DAffine3::IDENTITY);
             sum = 1.0;
         }
+        // Weights of 8 bits add up to 1 but for some 255ths.
+        scaled += usize::from((sum - 1.0).abs() > 0.05);
         let position = blend.transform_point3(mesh.positions[i].as_dvec3()) / sum;
         mesh.positions[i] = (position - origin).as_vec3();
         if !mesh.positions[i].is_finite() {
@@ -86,6 +88,7 @@ pub(super) fn pose(
         let normal = mesh.normals[i].as_dvec3();
         mesh.normals[i] = (cofactor * normal).normalize_or(normal).as_vec3();
     }
+    notices.add_some(place, scaled, "vertices have joint weights that do not sum to 1, scaled");
     notices.add_some(place, unbound, "vertices have no joint weights, moved with the first joint");
     Ok(DAffine3::from_translation(origin))
 }
