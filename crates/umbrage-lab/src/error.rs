@@ -348,7 +348,7 @@ mod tests {
         let cause = || std::io::Error::other("disk full");
         let measure = umbrage_measure::Error::Write { path: "a.png".into(), source: cause() };
         assert_eq!(Error::from(measure).to_string(), "cannot write a.png: disk full");
-        let scene = SceneError::Read { path: "a.glb".into(), source: cause() };
+        let scene = SceneError::Read { path: "a.glb".into(), problem: cause() };
         assert_eq!(Error::from(scene).to_string(), "a.glb: disk full");
         let messages = ["top", "why: root", "root"].map(str::to_owned);
         assert_eq!(joined(messages), "top: why: root");

@@ -82,11 +82,11 @@ impl<'a> TrianglePlane<'a> {
     fn distance(&self, point: DVec3) -> f64 {
         // The product n·(a − p) is the same number in mesh space and in world space. Divided by the
         // length of the world-space normal, it is the distance in world space.
-        self.normal.dot(self.from_first_corner(point)).abs() / self.world_normal.length()
+        self.normal.dot(self.relative(point)).abs() / self.world_normal.length()
     }
 
-    /// Mesh space.
-    fn from_first_corner(&self, point: DVec3) -> DVec3 {
+    /// A world point relative to the triangle's first corner, mesh space.
+    fn relative(&self, point: DVec3) -> DVec3 {
         let Placement { world_from_mesh, mesh_from_world, .. } = self.placement;
         *mesh_from_world * (point - world_from_mesh.translation) - self.corners[0]
     }
@@ -96,7 +96,7 @@ impl<'a> TrianglePlane<'a> {
     fn computed_error(&self, point: DVec3) -> f64 {
         let [a, b, c] = self.corners;
         let slenderness = (b - a).length() * (c - a).length() / self.normal.length();
-        let turned = self.from_first_corner(point).length() * self.placement.stretch * slenderness;
+        let turned = self.relative(point).length() * self.placement.stretch * slenderness;
         self.placement.position_error(self.corners, point) + COMPUTED * 0.25 * turned
     }
 

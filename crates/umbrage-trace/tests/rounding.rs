@@ -5,8 +5,8 @@ mod common;
 
 use common::{Random, camera, false_shadows, ground, nobody, plan, scene, sheet, sphere};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use umbrage::{Light, PointLight, Size, SpotLight, Technique, Warp};
-use umbrage_scene::{Mesh, Scene};
+use umbrage::{Camera, Light, LookAt, PointLight, Size, SpotLight, Technique, Warp};
+use umbrage_scene::{Mesh, Scene, builtin};
 use umbrage_trace::{Reference, Tracer, View};
 
 const IMAGE: [u32; 2] = [96, 72];
@@ -162,6 +162,31 @@ fn a_scene_has_the_same_shadows_far_from_the_origin() {
             let off = truth(&scene, offset).iter().zip(&home).filter(|(a, b)| a != b).count();
             // Two thousandths of a percent of the pixels.
             assert!(off <= home.len() / 5000, "{off} pixels differ at {offset} in {kind}");
+        }
+    }
+}
+
+#[test]
+fn scenes_of_many_parts_have_the_same_shadows_far_from_the_origin() {
+    for name in ["contacts", "fence", "statues"] {
+        let home = builtin(name, None).unwrap();
+        let look_at = home.default_view().look_at(IMAGE);
+        let light = home.default_light().light;
+        let truth = |offset: DVec3| {
+            let mut scene = home.clone();
+            scene.instances.iter_mut().for_each(|i| i.world_from_mesh.translation += offset);
+            let tracer = Tracer::new(&scene).unwrap();
+            let [eye, target] = [look_at.eye, look_at.target].map(|p| p + offset);
+            let camera = Camera::look_at(LookAt { eye, target, ..look_at }).unwrap();
+            let view = View::new(&tracer, camera, light, 1).unwrap();
+            let band = view.band(0..IMAGE[1], &nobody);
+            band.map(|s| s.is_facing.then(|| view.truth(s)), &nobody)
+        };
+        let near = truth(DVec3::ZERO);
+        assert!(near.iter().flatten().any(|&v| v == 0.0), "{name}");
+        for offset in [DVec3::new(2.6e6, 0.0, -1.3e6), DVec3::new(1.3e7, -1.3e7, 2e6)] {
+            let off = truth(offset).iter().zip(&near).filter(|(a, b)| a != b).count();
+            assert!(off <= near.len() / 5000, "{off} pixels of {name} differ at {offset}");
         }
     }
 }

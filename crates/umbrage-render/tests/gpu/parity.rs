@@ -1,11 +1,11 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
 use crate::{GPU, Set, scene};
-use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Quat, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
-use umbrage::{Light, Plan, Size, SpotLight, Technique};
-use umbrage_render::{Renderer, Sample, SceneBuffers, Shading};
+use umbrage::{Camera, Light, LookAt, Plan, PointLight, Size, SpotLight, Technique};
+use umbrage_render::{EdgeOn, Renderer, Sample, SceneBuffers, Shading};
 use umbrage_scene::{
     Alpha, Instance, Lens, Material, Mesh, Sampling, Scene, Texture, TextureId, Wrap,
 };
@@ -377,6 +377,66 @@ fn no_shadows() {
         check("lantern", &technique, &difference);
         assert!(samples.iter().all(|s| !s.is_facing || s.visibility == 1.0));
         assert!(samples.iter().all(|s| s.map.is_none() && s.error.is_nan()));
+    }
+}
+
+/// A lamp in the very plane of a roof, which is edge-on to it and hides nothing.
+#[needs(gpu)]
+#[test]
+fn a_lamp_lies_in_a_roof() {
+    let technique: Technique = "uniform@512".parse().unwrap();
+    for (tilt, turn) in [(0.0, 0.0), (0.3, 0.4), (-0.25, 1.1), (0.2, -2.3), (-0.1, 2.9)] {
+        let mut scene = scene("pole");
+        let lamp = Vec3::new(1.5, 5.5, 1.0);
+        let rotation = Quat::from_rotation_y(turn) * Quat::from_rotation_x(tilt);
+        // The lamp's foot lies amid one of the two triangles. The corners are rounded.
+        let corners = [[-5.0, -4.0], [3.0, -4.0], [3.0, 6.0], [-5.0, 6.0]];
+        let corner = |[x, z]: [f32; 2]| lamp + rotation * Vec3::new(x, 0.0, z);
+        let roof = Mesh {
+            positions: corners.map(corner).to_vec(),
+            normals: vec![rotation * Vec3::NEG_Y; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Mesh::default()
+        };
+        scene.meshes.push(roof);
+        let mesh = scene.meshes.len() - 1;
+        scene.instances.push(Instance { mesh, world_from_mesh: DAffine3::IDENTITY });
+        let mut set = Set::new(&scene, IMAGE);
+        set.camera = Camera::look_at(LookAt {
+            eye: DVec3::new(-4.0, 2.5, 8.0),
+            target: DVec3::new(0.5, 0.5, 0.0),
+            up: DVec3::Y,
+            fov_y_rad: 0.8,
+            near: 0.1,
+            far: 60.0,
+            image: IMAGE,
+        })
+        .unwrap();
+        let position = lamp.as_dvec3();
+        let light = Light::Point(PointLight { position, near: 0.01, range: 60.0 });
+        let plan = set.plan(&[light], &technique);
+        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+        let edge_on = set.tracer.edge_on_at(position).into_iter().map(|p| EdgeOn {
+            light: 0,
+            instance: p.instance as usize,
+            triangle: p.triangle,
+        });
+        let edge_on: Vec<EdgeOn> = edge_on.collect();
+        assert!(!edge_on.is_empty(), "tilted by {tilt}, turned by {turn}");
+        let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
+        let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+        renderer.leave_out(edge_on);
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+        let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
+        let difference = compare(&set, &plan, (0, &light), &samples, &reference);
+        check(&format!("roof tilted by {tilt}, turned by {turn}"), &technique, &difference);
+        let view = View::new(&set.tracer, set.camera, light, 1).unwrap();
+        let band = view.band(0..IMAGE[1], &|_| {});
+        let truth = band.map(|s| s.is_facing.then(|| view.truth(s)), &|_| {});
+        let pairs = truth.iter().zip(&samples).filter_map(|(t, s)| Some((t.as_ref()?, s)));
+        let wrong = pairs.filter(|(t, s)| (**t - s.visibility).abs() > 0.5).count();
+        assert!(wrong * 100 < difference.counted, "{wrong} of {} wrong", difference.counted);
     }
 }
 
