@@ -6,7 +6,7 @@ mod common;
 use common::{Random, camera, false_shadows, ground, nobody, plan, scene, sheet, sphere};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use umbrage::{Camera, Light, LookAt, PointLight, Size, SpotLight, Technique, Warp};
-use umbrage_scene::{Mesh, Scene, builtin};
+use umbrage_scene::{Mesh, Scene, SceneCamera, builtin};
 use umbrage_trace::{Reference, Tracer, View};
 
 const IMAGE: [u32; 2] = [96, 72];
@@ -170,14 +170,14 @@ fn a_scene_has_the_same_shadows_far_from_the_origin() {
 fn scenes_of_many_parts_have_the_same_shadows_far_from_the_origin() {
     for name in ["contacts", "fence", "statues"] {
         let home = builtin(name, None).unwrap();
-        let look_at = home.default_view().look_at(IMAGE);
+        let view_at_home = home.default_view();
         let light = home.default_light().light;
         let truth = |offset: DVec3| {
             let mut scene = home.clone();
             scene.instances.iter_mut().for_each(|i| i.world_from_mesh.translation += offset);
             let tracer = Tracer::new(&scene).unwrap();
-            let [eye, target] = [look_at.eye, look_at.target].map(|p| p + offset);
-            let camera = Camera::look_at(LookAt { eye, target, ..look_at }).unwrap();
+            let [eye, target] = [view_at_home.eye, view_at_home.target].map(|p| p + offset);
+            let camera = SceneCamera { eye, target, ..view_at_home.clone() }.camera(IMAGE).unwrap();
             let view = View::new(&tracer, camera, light, 1).unwrap();
             let band = view.band(0..IMAGE[1], &nobody);
             band.map(|s| s.is_facing.then(|| view.truth(s)), &nobody)

@@ -78,7 +78,11 @@ fn json_has_the_documented_shape() {
     assert!((plan["theta_deg"].as_f64().unwrap() - expected).abs() < 1e-9);
     // What there is for one map without a scene.
     let theta = &plan["theta_deg"];
-    assert_eq!(plan["lights"], json!([{"name": null, "theta_deg": theta, "maps": [0, 1]}]));
+    let light = &plan["lights"][0];
+    assert_eq!(keys(light), ["light", "maps", "name", "theta_deg"]);
+    assert_eq!((&light["theta_deg"], &light["maps"]), (theta, &json!([0, 1])));
+    assert_eq!((&light["light"]["kind"], &light["name"]), (&json!("directional"), &Value::Null));
+    assert_eq!((&plan["view"]["far"], &plan["fit"]), (&json!(500.0), &Value::Null));
     assert_eq!(plan["atlas"], json!({"size": [w, h], "gutter": 0}));
     assert_eq!(plan["layers"], json!({"size": [w, h], "count": 1}));
     assert_eq!(map["rect"], json!([0, 0, w, h]));

@@ -30,7 +30,7 @@ const VIEW: [&str; 10] = [
 ];
 
 /// Writes a scene of blocks. `more` are further nodes, and the parts of the file that they need.
-fn write(desk: &Desk, name: &str, blocks: &[Block<'_>], more: Value) {
+fn write(desk: &Desk, name: &str, blocks: &[Block<'_>], more: &Value) {
     let mut corners: Vec<u8> = Vec::new();
     for i in 0..8 {
         for bit in 0..3 {
@@ -100,8 +100,8 @@ fn info(desk: &Desk, scene: &str, options: &[&str]) -> Value {
 fn nothing_before_the_eye_is_cut_away() {
     let desk = Desk::new();
     let blocks = [GROUND, TOWER, NEAR_POST];
-    write(&desk, "vast.gltf", &blocks, json!({}));
-    write(&desk, "sky.gltf", &[&blocks[..], &[SKY]].concat(), json!({}));
+    write(&desk, "vast.gltf", &blocks, &json!({}));
+    write(&desk, "sky.gltf", &[&blocks[..], &[SKY]].concat(), &json!({}));
     let view = &VIEW[..4];
     for scene in ["vast.gltf", "sky.gltf"] {
         let found = info(&desk, scene, view);
@@ -126,8 +126,8 @@ fn nothing_before_the_eye_is_cut_away() {
 fn a_sky_decides_neither_size_nor_view_and_can_be_left_out() {
     let desk = Desk::new();
     let blocks = [("Ground", [0.0, -0.5, 0.0], [40.0, 0.5, 40.0]), TOWER, NEAR_POST];
-    write(&desk, "bare.gltf", &blocks, json!({}));
-    write(&desk, "sky.gltf", &[&[SKY], &blocks[..]].concat(), json!({}));
+    write(&desk, "bare.gltf", &blocks, &json!({}));
+    write(&desk, "sky.gltf", &[&[SKY], &blocks[..]].concat(), &json!({}));
     let [bare, sky] = ["bare.gltf", "sky.gltf"].map(|scene| info(&desk, scene, &[]));
     for field in ["size", "view", "light"] {
         assert_eq!(bare[field], sky[field], "{field}");
@@ -167,8 +167,8 @@ fn a_sky_decides_neither_size_nor_view_and_can_be_left_out() {
 fn nodes_are_left_out(backend: &str) {
     let desk = Desk::new();
     let ground = ("Ground", [0.0, -0.5, 0.0], [40.0, 0.5, 40.0]);
-    write(&desk, "all.gltf", &[ground, TOWER], json!({}));
-    write(&desk, "ground.gltf", &[ground], json!({}));
+    write(&desk, "all.gltf", &[ground, TOWER], &json!({}));
+    write(&desk, "ground.gltf", &[ground], &json!({}));
     let of = |scene: &str, aov: &str, without: &[&str]| {
         let options = ["--backend", backend, "--shadows=uniform@512"];
         let args = ["render", scene, "-o", "p.png", "--samples", "1", "--aov", aov];
@@ -183,10 +183,10 @@ fn nodes_are_left_out(backend: &str) {
         assert_eq!(dark(&none), 0, "{aov}");
         // It stands there, with its lit sides before the eye, but its shadow on the ground is gone.
         assert_eq!(dark(&of("all.gltf", aov, &["--without", "Tower:casting"])), 0, "{aov}");
-        assert!(dark(&all) > 50, "{aov}");
-        // Its shadow is there, more of it than the tower leaves open.
+        assert!(dark(&all) > 4, "{aov}");
+        // All of its shadow is there, also what the tower hides from the eye.
         let unseen = of("all.gltf", aov, &["--without", "Tower:receiving"]);
-        assert!(dark(&unseen) > 50, "{aov}");
+        assert!(dark(&unseen) > 2 * dark(&all), "{aov}");
     }
     let depth = |without: &[&str]| of("all.gltf", "normal", without);
     let none = of("ground.gltf", "normal", &[]);
@@ -209,7 +209,7 @@ fn nodes_are_left_out_by_a_gpu() {
 #[test]
 fn nodes_that_are_not_there_and_scenes_without_anything_are_refused() {
     let desk = Desk::new();
-    write(&desk, "all.gltf", &[GROUND, TOWER], json!({}));
+    write(&desk, "all.gltf", &[GROUND, TOWER], &json!({}));
     for (without, expected) in [
         ("Towr", "--without: the scene has no node `Towr`; there are Ground or #1, Tower or #2"),
         ("#3", "--without: the scene has no node `#3`"),
@@ -249,7 +249,7 @@ fn names_that_several_have_choose_none_and_numbers_always_do() {
         "perspective": {"yfov": 0.8, "znear": 0.1, "zfar": 50}}]);
     let more = json!({"extensions": lights, "extensionsUsed": ["KHR_lights_punctual"],
         "cameras": cameras, "nodes": nodes});
-    write(&desk, "shared.gltf", &[TOWER], more);
+    write(&desk, "shared.gltf", &[TOWER], &more);
     let found = info(&desk, "shared.gltf", &[]);
     let words = |kind: &str| -> Vec<Value> {
         found[kind].as_array().unwrap().iter().map(|of| of["words"].clone()).collect()
@@ -325,7 +325,7 @@ fn info_tells_what_is_there() {
 #[test]
 fn the_sun_stands_where_its_angles_say() {
     let desk = Desk::new();
-    write(&desk, "all.gltf", &[GROUND, TOWER], json!({}));
+    write(&desk, "all.gltf", &[GROUND, TOWER], &json!({}));
     for (angles, sun) in [("90,45", "-1,-1,0"), ("180,0", "0,0,-1"), ("-45,35.26438968", "1,-1,1")]
     {
         let [by_angles, by_sun] = [format!("--sun-angles={angles}"), format!("--sun={sun}")]
@@ -348,7 +348,7 @@ fn the_sun_stands_where_its_angles_say() {
 #[test]
 fn ground_lies_under_a_model() {
     let desk = Desk::new();
-    write(&desk, "model.gltf", &[("Model", [5.0, 1.0, 0.0], [1.0, 1.0, 1.0])], json!({}));
+    write(&desk, "model.gltf", &[("Model", [5.0, 1.0, 0.0], [1.0, 1.0, 1.0])], &json!({}));
     let found = info(&desk, "model.gltf", &["--ground"]);
     assert_eq!(found["bounds"]["min"][1], 0.0);
     assert_eq!(found["size"][1], 2.0);
@@ -450,7 +450,7 @@ fn shells_complete_command_lines() {
 #[test]
 fn sweeps_take_the_same_options() {
     let desk = Desk::new();
-    write(&desk, "all.gltf", &[GROUND, TOWER], json!({}));
+    write(&desk, "all.gltf", &[GROUND, TOWER], &json!({}));
     desk.write(
         "views.json",
         r##"[{"name": "a", "scene": "all.gltf", "sun-angles": [90, 45], "size": [16, 9]},

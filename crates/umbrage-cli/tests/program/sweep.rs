@@ -516,7 +516,6 @@ fn options_and_places_that_do_not_fit() {
     }
     assert_eq!(listing(&desk.path("full")), ["thesis.tex"]);
     refuses(&desk, &["sweep", "nowhere.json", "-o", "out"], "VIEWS: nowhere.json");
-    refuses(&desk, &["sweep", "views.json"], "--output");
 }
 
 #[test]
