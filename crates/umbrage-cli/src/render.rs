@@ -12,7 +12,7 @@ use umbrage_lab::{
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
-    write_exr, write_png,
+    with_legend, write_exr, write_png,
 };
 use umbrage_trace::{View, shade};
 
@@ -180,12 +180,16 @@ impl Picture {
                 &counted,
                 &rgb(self.truth.color)?,
             )?,
-            Aov::Error => error_map(
-                &Image::new(size, self.texels.error)?,
-                &counted,
-                &rgb(self.technique.color)?,
-                ErrorScale::default(),
-            )?,
+            Aov::Error => {
+                let scale = ErrorScale::default();
+                let map = error_map(
+                    &Image::new(size, self.texels.error)?,
+                    &counted,
+                    &rgb(self.technique.color)?,
+                    scale,
+                )?;
+                with_legend(map, scale)
+            }
             Aov::Texels => {
                 texel_map(&Image::new(size, self.texels.texel)?, &rgb(self.technique.color)?)?
             }

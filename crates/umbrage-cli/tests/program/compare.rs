@@ -136,7 +136,7 @@ fn more_texels_are_less_wrong() {
 fn the_table_lists_every_technique_and_the_report() {
     let desk = Desk::new();
     let table = desk.succeed(&["compare", "pole", "-o", "report", "--size", "32x18"]);
-    for technique in ["uniform", "psm", "lispsm", "tsm", "adaptive"] {
+    for technique in ["uniform", "psm", "lispsm", "tsm", "adaptive", "uniform(stable)+z4:pcf3", "adaptive:pcf3"] {
         assert!(table.lines().any(|l| l.starts_with(technique)), "{table}");
     }
     assert!(table.ends_with("report: report/index.html\n"), "{table}");
