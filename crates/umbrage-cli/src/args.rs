@@ -23,7 +23,7 @@ use std::path::PathBuf;
 
 /// How wrong is which shadow mapping technique, where, and at what price, against ray-traced truth.
 ///
-/// Without a command it compares five techniques on a built-in scene and writes the folder
+/// Without a command it compares seven techniques on a built-in scene and writes the folder
 /// `report`.
 #[derive(Debug, Parser)]
 #[command(

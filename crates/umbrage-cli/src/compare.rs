@@ -52,7 +52,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
         note(&format!("report: {}", page.display()));
         print(&report.to_json()?)
     } else {
-        print(&format!("{}\nreport: {}\n", table(&report), page.display()))
+        print(&format!("{}\n{}\nreport: {}\n", table(&report), report.verdict(), page.display()))
     }
 }
 

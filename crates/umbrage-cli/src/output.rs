@@ -4,6 +4,7 @@ use anyhow::{Context, Error, Result};
 use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
 use umbrage_lab::Field;
+use umbrage_measure::quoted;
 
 /// Writes to standard output. A closed pipe is no error, because its reader has seen enough.
 pub(crate) fn print(text: &str) -> Result<()> {
@@ -25,15 +26,6 @@ pub(crate) fn command_line() -> String {
     let mut words = vec!["umbrage".to_owned()];
     words.extend(std::env::args_os().skip(1).map(|w| quoted(&w.to_string_lossy())));
     words.join(" ")
-}
-
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=+,./:@%".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 /// Formats rows with equal numbers of cells as lines of text. The first column is aligned to the

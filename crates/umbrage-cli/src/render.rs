@@ -12,7 +12,7 @@ use umbrage_lab::{
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
-    write_exr, write_png,
+    with_legend, write_exr, write_png,
 };
 use umbrage_trace::{AreaLight, View, shade};
 
@@ -201,12 +201,16 @@ impl Data {
                 &counted,
                 &rgb(self.truth.color.clone())?,
             )?,
-            Aov::Error => error_map(
-                &Image::new(size, self.texels.error.clone())?,
-                &counted,
-                &rgb(self.technique.color.clone())?,
-                ErrorScale::default(),
-            )?,
+            Aov::Error => {
+                let scale = ErrorScale::default();
+                let map = error_map(
+                    &Image::new(size, self.texels.error.clone())?,
+                    &counted,
+                    &rgb(self.technique.color.clone())?,
+                    scale,
+                )?;
+                with_legend(map, scale)
+            }
             Aov::Texels => texel_map(
                 &Image::new(size, self.texels.texel.clone())?,
                 &rgb(self.technique.color.clone())?,

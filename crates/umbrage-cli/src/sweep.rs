@@ -36,7 +36,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
         note(&format!("report: {}", page.display()));
         print(&sweep.to_json()?)?;
     } else {
-        print(&format!("{}\nreport: {}\n", table(&sweep), page.display()))?;
+        print(&format!("{}\n{}\nreport: {}\n", table(&sweep), sweep.verdict(), page.display()))?;
     }
     let failed: Vec<&str> =
         sweep.views.iter().filter(|v| v.outcome.is_err()).map(|v| v.name.as_str()).collect();
@@ -51,11 +51,14 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
 }
 
 fn table(sweep: &Sweep) -> String {
-    let mut rows = vec![["geometric mean of", "wrong", "mean error", "views"].map(str::to_owned)];
+    let mut rows = vec![
+        ["geometric mean of", "light error", "wrong", "mean error", "views"].map(str::to_owned),
+    ];
     rows.extend(sweep.means().into_iter().map(|m| {
         let text = |v: Option<f64>, text: fn(f64) -> String| v.map_or("-".to_owned(), text);
         [
             m.shadows,
+            text(m.light_error, |v| format!("{v:.4}")),
             text(m.wrong_fraction, |v| format!("{:.2}%", v * 100.0)),
             text(m.mean_abs_error, |v| format!("{v:.4}")),
             m.views.to_string(),

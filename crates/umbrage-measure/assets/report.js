@@ -11,10 +11,9 @@
 
   const state = { left: 0, right: 1, kind: "color", split: 50, zoom: 8, spot: firstSpot() };
 
-  /** The worst place of the first technique that has one, else the middle; pixels. */
+  /** Where techniques differ most, else the middle; pixels. */
   function firstSpot() {
-    const item = data.items.find((item) => item.spot);
-    return item ? [...item.spot] : [Math.floor(width / 2), Math.floor(height / 2)];
+    return data.spot ? [...data.spot] : [Math.floor(width / 2), Math.floor(height / 2)];
   }
 
   /** What an item shows for the kind chosen: the truth has no maps and shows its picture instead. */

@@ -54,6 +54,16 @@ impl<T> Image<T> {
         &self.pixels[self.index(x, y)]
     }
 
+    /// The value at column `x` and row `y`, to be changed.
+    ///
+    /// # Panics
+    /// The pixel lies outside the image.
+    pub(crate) fn at_mut(&mut self, x: u32, y: u32) -> &mut T {
+        assert!(x < self.size[0] && y < self.size[1], "pixel ({x}, {y}) outside {:?}", self.size);
+        let index = self.index(x, y);
+        &mut self.pixels[index]
+    }
+
     /// The image whose values are `f` of this image's values.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Image<U> {
         Image { size: self.size, pixels: self.pixels.iter().map(f).collect() }

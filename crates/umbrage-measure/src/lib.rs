@@ -19,6 +19,7 @@ mod color;
 mod error;
 mod files;
 mod image;
+mod legend;
 mod maps;
 mod metrics;
 mod page;
@@ -26,15 +27,18 @@ mod pictures;
 mod report;
 mod sweep;
 mod temporary;
+mod verdict;
 
 pub use color::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS};
 pub use error::Error;
 pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_png};
 pub use image::{Image, Rgb};
+pub use legend::with_legend;
 pub use maps::{difference_map, error_map, grey, noise_map, partition_map, texel_map};
-pub use metrics::{ErrorPx, Metrics, measure, measure_error_px, worst_spot};
+pub use metrics::{ErrorPx, Metrics, Spots, measure, measure_error_px};
 pub use page::{
-    FigureFile, FigureShown, FiguresPage, Page, SweepPage, write_figures, write_report, write_sweep,
+    FigureFile, FigureShown, FiguresPage, Page, SweepPage, quoted, write_figures, write_report,
+    write_sweep,
 };
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
 pub use report::{AreaTruth, LightInfo, Measured, Motion, Report, Times, Truth, TruthKind, View};

@@ -115,38 +115,73 @@ pub fn measure_error_px(error: &Image<f32>, counted: &Image<bool>) -> Result<Err
     })
 }
 
-/// The centre of the square of 32×32 pixels in which `technique` is most wrong, by the
-/// sum of |technique − truth|; `None` if it is right everywhere. The values are visibilities or any
-/// others from 0 to 1, such as the brightness of pictures.
-///
-/// # Errors
-/// As [`measure`].
-pub fn worst_spot(
-    truth: &Image<f32>,
-    technique: &Image<f32>,
-    counted: &Image<bool>,
-) -> Result<Option<[u32; 2]>, Error> {
+/// How wrong a technique is in each place of the picture, which is divided into squares.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spots {
+    /// Width and height of the picture, pixels.
+    size: [u32; 2],
+    /// The sum of |technique − truth| over the counted pixels of each square, row by row.
+    sums: Vec<f64>,
+}
+
+impl Spots {
+    /// Side of a square, pixels.
     const SIDE: u32 = 32;
-    check_visibilities(truth, technique, counted)?;
-    let [w, h] = truth.size();
-    let columns = w.div_ceil(SIDE) as usize;
-    let mut sums = vec![0.0_f64; columns * h.div_ceil(SIDE) as usize];
-    for (i, difference) in differences(truth, technique, counted).enumerate() {
-        let [x, y] = truth.position(i);
-        sums[(y / SIDE) as usize * columns + (x / SIDE) as usize] +=
-            f64::from(difference.unwrap_or(0.0).abs());
-    }
-    // Of equal maxima the first one is taken, so that the result does not depend on the order of
-    // the search.
-    let mut worst = 0;
-    for (i, sum) in sums.iter().enumerate() {
-        if *sum > sums[worst] {
-            worst = i;
+
+    /// Compares `technique` with `truth`. The values are visibilities or any others from 0 to 1,
+    /// such as the brightness of pictures.
+    ///
+    /// # Errors
+    /// The sizes differ, or a value at a counted pixel is not finite.
+    pub fn measure(
+        truth: &Image<f32>,
+        technique: &Image<f32>,
+        counted: &Image<bool>,
+    ) -> Result<Self, Error> {
+        check_visibilities(truth, technique, counted)?;
+        let size = truth.size();
+        let [columns, rows] = size.map(|n| n.div_ceil(Self::SIDE) as usize);
+        let mut sums = vec![0.0_f64; columns * rows];
+        for (i, difference) in differences(truth, technique, counted).enumerate() {
+            let [x, y] = truth.position(i);
+            sums[(y / Self::SIDE) as usize * columns + (x / Self::SIDE) as usize] +=
+                f64::from(difference.unwrap_or(0.0).abs());
         }
+        Ok(Self { size, sums })
     }
-    let cell = [(worst % columns) as u32, (worst / columns) as u32];
-    let center = |cell: u32, n: u32| (cell * SIDE + SIDE / 2).min(n - 1);
-    Ok((sums[worst] > 0.0).then(|| [center(cell[0], w), center(cell[1], h)]))
+
+    /// The centre of the square in which the technique is most wrong, column and row; `None` if it is
+    /// right everywhere.
+    pub fn worst(&self) -> Option<[u32; 2]> {
+        self.largest(self.sums.iter().copied())
+    }
+
+    /// The centre of the square in which techniques differ most in how wrong they are, column and
+    /// row; `None` if they do not differ, or if their pictures are not of one size.
+    pub fn most_different(techniques: &[&Self]) -> Option<[u32; 2]> {
+        let first = techniques.first()?;
+        if techniques.iter().any(|t| t.size != first.size) {
+            return None;
+        }
+        let spread = |i: usize| {
+            let sums = techniques.iter().map(|t| t.sums[i]);
+            sums.clone().fold(0.0, f64::max) - sums.fold(f64::INFINITY, f64::min)
+        };
+        first.largest((0..first.sums.len()).map(spread))
+    }
+
+    /// The centre of the square with the largest value; `None` if no value is above 0. Of equal
+    /// squares it is the first.
+    fn largest(&self, values: impl Iterator<Item = f64>) -> Option<[u32; 2]> {
+        let none = (0, 0.0);
+        let (index, value) =
+            values.enumerate().fold(none, |best, (i, v)| if v > best.1 { (i, v) } else { best });
+        let columns = self.size[0].div_ceil(Self::SIDE) as usize;
+        let square = [index % columns, index / columns];
+        let center =
+            |i: usize| (square[i] as u32 * Self::SIDE + Self::SIDE / 2).min(self.size[i] - 1);
+        (value > 0.0).then(|| [center(0), center(1)])
+    }
 }
 
 /// `technique` − `truth` at each pixel; `None` where the pixel is not counted.
@@ -254,7 +289,7 @@ mod tests {
         let none = v.map(|_| false);
         assert_eq!(measure(&v, &v, &none, &v).unwrap(), Metrics::default());
         assert_eq!(measure_error_px(&v, &none).unwrap(), ErrorPx::default());
-        assert_eq!(worst_spot(&v, &v, &none).unwrap(), None);
+        assert_eq!(Spots::measure(&v, &v, &none).unwrap().worst(), None);
     }
 
     #[test]
@@ -334,7 +369,17 @@ mod tests {
         let all = truth.map(|_| true);
         // The square at the lower right is cut off by the edge of the picture; its centre stays
         // inside.
-        assert_eq!(worst_spot(&truth, &technique, &all).unwrap(), Some([99, 69]));
-        assert_eq!(worst_spot(&truth, &truth, &all).unwrap(), None);
+        let wrong = Spots::measure(&truth, &technique, &all).unwrap();
+        let right = Spots::measure(&truth, &truth, &all).unwrap();
+        assert_eq!([wrong.worst(), right.worst()], [Some([99, 69]), None]);
+        // Techniques that are equally wrong there differ elsewhere.
+        let both = technique.map(|&v| v);
+        let other =
+            Image::from_fn([100, 70], |x, y| both.at(x, y) * f32::from((x, y) != (40, 3))).unwrap();
+        let other = Spots::measure(&truth, &other, &all).unwrap();
+        assert_eq!(other.worst(), Some([99, 69]));
+        assert_eq!(Spots::most_different(&[&wrong, &other, &wrong]), Some([48, 16]));
+        assert_eq!(Spots::most_different(&[&wrong, &wrong]), None);
+        assert_eq!(Spots::most_different(&[]), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::maps::luma;
 use crate::{
-    Error, ErrorScale, Image, Rgb, difference_map, error_map, grey, worst_spot, write_png,
+    Error, ErrorScale, Image, Rgb, Spots, difference_map, error_map, grey, with_legend, write_png,
 };
 use std::path::Path;
 
@@ -36,7 +36,7 @@ pub struct SeenTruth<'a> {
 }
 
 /// Names of the PNG files of one technique (or of the truth), relative to the report's folder.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pictures {
     /// The shaded picture.
     pub color: String,
@@ -50,10 +50,9 @@ pub struct Pictures {
     pub partition: Option<String>,
     /// The [`texel_map`](crate::texel_map), if there is one.
     pub texels: Option<String>,
-    /// Column and row where the picture is most visibly wrong: the [`worst_spot`] of the pictures'
-    /// brightness. Visibility would not do, because a wrong visibility hardly shows where light
-    /// grazes a surface.
-    pub worst_spot: Option<[u32; 2]>,
+    /// Where the picture is wrong, by its brightness; `None` for the truth. Visibility would not do,
+    /// because a wrong visibility hardly shows where light grazes a surface.
+    pub spots: Option<Spots>,
 }
 
 /// Writes the truth's pictures into `folder`: `truth-color.png` and `truth-visibility.png`.
@@ -93,11 +92,11 @@ pub fn write_pictures(
     let counted = truth.counted;
     error_px.check_like(truth.visibility, "error")?;
     let difference = difference_map(truth.visibility, visibility, counted, truth.color)?;
-    let error = error_map(error_px, counted, truth.color, scale)?;
+    let error = with_legend(error_map(error_px, counted, truth.color, scale)?, scale);
     let others = [seen.partition, seen.texels].into_iter().flatten();
     others.chain([color]).try_for_each(|p| p.check_like(truth.visibility, "picture"))?;
     let brightness = |picture: &Image<Rgb>| picture.map(|&c| luma(c) / 255.0);
-    let spot = worst_spot(&brightness(truth.color), &brightness(color), counted)?;
+    let spots = Spots::measure(&brightness(truth.color), &brightness(color), counted)?;
 
     let name = |kind: &str| format!("{index:02}-{}-{kind}.png", file_stem(shadows));
     let write = |kind, image: &Image<Rgb>| {
@@ -113,7 +112,7 @@ pub fn write_pictures(
         error: Some(write("error", &error)?),
         partition: seen.partition.map(|p| write("partition", p)).transpose()?,
         texels: seen.texels.map(|t| write("texels", t)).transpose()?,
-        worst_spot: spot,
+        spots: Some(spots),
     })
 }
 

@@ -78,6 +78,13 @@ pub struct Mean {
     /// Number of views whose figure was smaller than one wrong pixel and was raised to it in this
     /// mean.
     pub wrong_fraction_raised: usize,
+    /// Geometric mean of [`Metrics::light_error`]; `None` if no view was counted.
+    pub light_error: Option<f64>,
+    /// Number of views whose figure was smaller than one wrong pixel and was raised to it in this
+    /// mean.
+    pub light_error_raised: usize,
+    /// Geometric mean of [`Measured::bytes`]; `None` if it is not known in all views.
+    pub bytes: Option<f64>,
     /// Geometric mean of [`Metrics::mean_abs_error`]; `None` if no view was counted.
     pub mean_abs_error: Option<f64>,
     /// Number of views whose figure was smaller than one wrong pixel and was raised to it in this
@@ -130,8 +137,13 @@ impl Sweep {
     pub fn means(&self) -> Vec<Mean> {
         let shadows = self.settings.shadows.iter().enumerate();
         let mean = |(i, shadows): (usize, &String)| {
-            let metrics = self.reports().filter_map(|(_, r)| Some(&r.results.get(i)?.metrics));
-            let counted: Vec<&Metrics> = metrics.filter(|m| m.counted > 0).collect();
+            let results = self.reports().filter_map(|(_, r)| r.results.get(i));
+            let results: Vec<&Measured> = results.filter(|r| r.metrics.counted > 0).collect();
+            let counted: Vec<&Metrics> = results.iter().map(|r| &r.metrics).collect();
+            let (light_error, light_error_raised) = geometric_mean(&counted, |m| m.light_error);
+            let logarithms = results.iter().map(|r| Some((r.bytes? as f64).ln()));
+            let logarithms: Option<f64> = logarithms.sum();
+            let bytes = logarithms.map(|sum| (sum / results.len() as f64).exp());
             let (wrong_fraction, wrong_fraction_raised) =
                 geometric_mean(&counted, |m| m.wrong_fraction);
             let (mean_abs_error, mean_abs_error_raised) =
@@ -141,6 +153,9 @@ impl Sweep {
                 views: counted.len(),
                 wrong_fraction,
                 wrong_fraction_raised,
+                light_error,
+                light_error_raised,
+                bytes: bytes.filter(|b| b.is_finite()),
                 mean_abs_error,
                 mean_abs_error_raised,
             }

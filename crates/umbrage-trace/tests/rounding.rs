@@ -5,7 +5,7 @@ mod common;
 
 use common::{Random, camera, false_shadows, ground, nobody, plan, scene, sheet, sphere};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
-use umbrage::{Camera, Light, LookAt, PointLight, Size, SpotLight, Technique, Warp};
+use umbrage::{Light, PointLight, Size, SpotLight, Technique, Warp};
 use umbrage_scene::{Mesh, Scene, SceneCamera, builtin};
 use umbrage_trace::{Reference, Tracer, View};
 

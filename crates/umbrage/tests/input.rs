@@ -408,8 +408,8 @@ fn wide_spots_are_parts_of_point_lights() {
                 }
                 for (x, y) in [(100.0, 300.0), (320.0, 250.0), (600.0, 400.0), (30.0, 470.0)] {
                     let ray = camera.ray(DVec2::new(x, y));
-                    let p = VIEW.eye + ray * (VIEW.eye.y / -ray.y);
-                    if ray.y < 0.0 && light.reaches(p) && camera.depth(p) < VIEW.far {
+                    let p = VIEW.eye + ray.at(VIEW.eye.y / -ray.direction.y);
+                    if ray.direction.y < 0.0 && light.reaches(p) && camera.depth(p) < VIEW.far {
                         assert_eq!(plan.lookup(0, p).count(), 1, "{name}, {half_deg}°: {p}");
                     }
                 }

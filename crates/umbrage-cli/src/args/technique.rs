@@ -6,8 +6,10 @@ use clap::{Args, ValueEnum};
 use umbrage::visibility::LightSize;
 use umbrage_lab::{Backend, ComparisonOptions, NamedTechnique};
 
-/// What `compare` compares if not told.
-pub(crate) const DEFAULT_TECHNIQUES: [&str; 5] = ["uniform", "psm", "lispsm", "tsm", "adaptive"];
+/// What is compared if not told: the papers' maps, and what renderers ship beside its counterpart of
+/// this library.
+pub(crate) const DEFAULT_TECHNIQUES: [&str; 7] =
+    ["uniform", "psm", "lispsm", "tsm", "adaptive", "uniform(stable)+z4:pcf3", "adaptive:pcf3"];
 
 /// Techniques that compete.
 #[derive(Clone, Debug, Args)]

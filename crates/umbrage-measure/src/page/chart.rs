@@ -6,12 +6,12 @@ use crate::{ErrorScale, Measured, Report};
 use std::fmt::Write;
 
 /// A tick of the scale of pixels per texel.
-pub(super) struct Tick {
+pub(crate) struct Tick {
     /// Distance from the left end, percent of the scale.
-    pub(super) at: f32,
-    pub(super) label: String,
+    pub(crate) at: f32,
+    pub(crate) label: String,
     /// Whether this tick marks 1 pixel per texel.
-    pub(super) one: bool,
+    pub(crate) one: bool,
 }
 
 /// The line of one technique in the chart.
@@ -48,7 +48,7 @@ pub(super) fn gradient() -> String {
 
 /// About seven powers of two. 1 is one of them, and so are the ends of the scale if they are
 /// powers.
-pub(super) fn ticks(scale: ErrorScale) -> Vec<Tick> {
+pub(crate) fn ticks(scale: ErrorScale) -> Vec<Tick> {
     let largest = scale.max().log2().floor() as i32;
     let step = (largest + 1) / 3;
     let outer = (0..).map(|i| largest - i * step.max(1)).take_while(|&e| e > 0);

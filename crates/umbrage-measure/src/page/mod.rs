@@ -1,7 +1,9 @@
 //! The HTML pages of reports, of sweeps, and of the papers' figures.
 
 mod chart;
+mod command;
 mod figures;
+mod finding;
 mod numbers;
 mod sweep;
 mod table;
@@ -9,6 +11,8 @@ mod view;
 
 use crate::{Error, ErrorScale, Pictures, Report, write_file};
 use askama::Template;
+pub(crate) use chart::{Tick, ticks};
+pub use command::quoted;
 pub use figures::{FigureFile, FigureShown, FiguresPage, write_figures};
 use std::path::Path;
 pub use sweep::{SweepPage, write_sweep};

@@ -1,8 +1,10 @@
 //! Fills the template of a sweep's page.
 
+use super::command;
+use super::finding::{self, Finding};
 use super::numbers::{percent, significant};
 use super::table::{self, Cell, Column};
-use super::view::{Finding, codes, plural, rays_a_pixel, techniques, url};
+use super::view::{code, meaning, plural, rays_a_pixel, techniques, url};
 use crate::pictures::TRUTH_COLOR;
 use crate::{Error, Mean, Measured, Sweep, SweptView, write_file};
 use askama::Template;
@@ -61,14 +63,25 @@ struct Html<'a> {
     views: Vec<Shown<'a>>,
     columns: Vec<Column>,
     undefined: bool,
-    techniques: Vec<(String, &'static str)>,
-    codes: Vec<(String, String)>,
+    techniques: Vec<(Vec<String>, &'static str)>,
+    codes: Vec<Code<'a>>,
     setup: Vec<(&'static str, String)>,
     command: Option<&'a str>,
 }
 
+/// How a technique is made.
+struct Code<'a> {
+    shadows: &'a str,
+    code: String,
+    render: String,
+}
+
 struct ShownMean<'a> {
     mean: &'a Mean,
+    best: bool,
+    /// What the words of the specification mean, for a tooltip.
+    meaning: String,
+    light: Cell,
     wrong: Cell,
     error: Cell,
 }
@@ -97,6 +110,9 @@ impl<'a> Html<'a> {
         let settings = &sweep.settings;
         let wrong = means.iter().map(|m| m.wrong_fraction).collect::<Vec<_>>();
         let error = means.iter().map(|m| m.mean_abs_error).collect::<Vec<_>>();
+        let light = means.iter().map(|m| m.light_error).collect::<Vec<_>>();
+        let light = table::cells(&light, significant, true);
+        let finding = finding::of_sweep(sweep, means);
         let cells = table::cells(&wrong, percent, true).into_iter().zip(table::cells(
             &error,
             significant,
@@ -108,25 +124,40 @@ impl<'a> Html<'a> {
             Some(pixels) if !shadows.contains('@') => format!("{shadows}@{pixels}px"),
             _ => shadows.clone(),
         });
-        let executed: Vec<String> = executed.collect();
+        let scene = sweep.views.first().map_or("SCENE", |view| view.scene.as_str());
+        let codes = shadows.clone().zip(executed).filter_map(|(shadows, executed)| {
+            let render = command::render(scene, &executed);
+            Some(Code { shadows, code: code(&executed)?, render })
+        });
         Self {
             css: include_str!("../../assets/report.css"),
             js: include_str!("../../assets/table.js"),
             version: env!("CARGO_PKG_VERSION"),
             name: &sweep.name,
             facts: facts(sweep),
-            finding: finding(sweep, means),
             means: means
                 .iter()
+                .zip(light)
                 .zip(cells)
-                .map(|(mean, (wrong, error))| ShownMean { mean, wrong, error })
+                .enumerate()
+                .map(|(i, ((mean, light), (wrong, error)))| ShownMean {
+                    mean,
+                    best: finding.best == Some(i),
+                    meaning: meaning(&mean.shadows),
+                    light,
+                    wrong,
+                    error,
+                })
                 .collect(),
+            finding,
             means_over: means_over(sweep, means),
-            any_raised: means.iter().any(|m| m.wrong_fraction_raised + m.mean_abs_error_raised > 0),
+            any_raised: means.iter().any(|m| {
+                m.light_error_raised + m.wrong_fraction_raised + m.mean_abs_error_raised > 0
+            }),
             views: sweep.views.iter().map(|v| Shown::new(v, &columns)).collect(),
             undefined: results.iter().any(|r| r.error_px.undefined > 0),
             columns,
-            codes: codes(shadows.clone().zip(executed.iter().map(String::as_str))),
+            codes: codes.collect(),
             techniques: techniques(shadows),
             setup: setup(sweep),
             command,
@@ -165,37 +196,6 @@ fn facts(sweep: &Sweep) -> String {
         facts.push(format!("share {share}"));
     }
     facts.join(" · ")
-}
-
-fn finding(sweep: &Sweep, means: &[Mean]) -> Finding {
-    let known = |m: &'_ &Mean| Some((m.wrong_fraction?, m.shadows.clone()));
-    let mut ranked: Vec<(f64, String)> = means.iter().filter_map(|m| known(&m)).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let say = |name: &str, rest: String| Finding { name: name.to_owned(), rest };
-    match &ranked[..] {
-        [] if sweep.views.is_empty() => say("", "This share has no views.".to_owned()),
-        [] => say("", "No view shows anything to measure.".to_owned()),
-        [(wrong, name)] => say(
-            name,
-            format!("shows {} % of the counted pixels wrong in the mean.", percent(*wrong)),
-        ),
-        [(least, best), .., (most, _)] if least == most => say(
-            best,
-            format!(
-                "shows {} % of the counted pixels wrong in the mean, as do all the others.",
-                percent(*least)
-            ),
-        ),
-        [(least, best), .., (most, worst)] => say(
-            best,
-            format!(
-                "comes closest to the truth: in the mean {} % of the counted pixels are wrong. {worst} \
-                 gets {} times as many.",
-                percent(*least),
-                significant(most / least)
-            ),
-        ),
-    }
 }
 
 /// A sentence that says which views the means are over.
@@ -243,24 +243,6 @@ fn setup(sweep: &Sweep) -> Vec<(&'static str, String)> {
 mod tests {
     use super::*;
     use crate::sweep::tests::sweep;
-
-    #[test]
-    fn finding_compares_means() {
-        let say = |views: &[Option<&[Option<f64>]>]| {
-            let sweep = sweep(views);
-            let finding = finding(&sweep, &sweep.means());
-            format!("{} {}", finding.name, finding.rest)
-        };
-        assert_eq!(
-            say(&[Some(&[Some(0.2), Some(0.02)]), Some(&[Some(0.2), Some(0.08)])]),
-            "lambda=1@1024 comes closest to the truth: in the mean 4.00 % of the counted pixels are \
-             wrong. lambda=0@1024 gets 5.00 times as many."
-        );
-        assert!(say(&[Some(&[Some(0.5)])]).contains("lambda=0@1024 shows 50.0 %"));
-        assert!(say(&[Some(&[Some(0.5), Some(0.5)])]).ends_with(", as do all the others."));
-        assert!(say(&[Some(&[None]), None]).contains("No view shows anything to measure"));
-        assert!(say(&[]).contains("no views"));
-    }
 
     #[test]
     fn what_is_left_out_is_said() {

@@ -54,6 +54,12 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
     let whole = |c: Column| unjudged(Column { text: |v| count(v as u64), ..c });
     let share = |c: Column| Column { text: percent, ..c };
     let columns = [
+        column(
+            "Light error",
+            "0–1",
+            "Mean absolute difference between visibility and truth, weighted by the cosine towards the light",
+            |r| r.metrics.light_error,
+        ),
         share(column(
             "Wrong",
             "%",
@@ -112,9 +118,11 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
             |r| r.noise,
         )),
         whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
-        whole(column("Texels", "", "Texels of all maps together", |r| Some(r.texels as f64))),
-        rare(whole(column("Memory", "KiB", "Memory that lookups read", |r| {
-            r.bytes.map(|b| (b as f64 / 1024.0).ceil())
+        unjudged(column("Texels", "million", "Texels of all maps together", |r| {
+            Some(r.texels as f64 / 1e6)
+        })),
+        rare(unjudged(column("Memory", "MiB", "Memory that lookups read", |r| {
+            r.bytes.map(|b| b as f64 / (1024.0 * 1024.0))
         }))),
         time(column("Plan", "ms", "Time to plan the maps", |r| r.ms.plan)),
         time(column("Depth", "ms", "Time to render the maps", |r| r.ms.depth)),

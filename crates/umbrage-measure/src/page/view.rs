@@ -2,9 +2,11 @@
 
 use super::Page;
 use super::chart::{self, Line, Tick};
+use super::command;
+use super::finding::{self, Finding};
 use super::numbers::{count, duration_ms, percent, plain, significant, vector};
 use super::table::{self, Cell, Column};
-use crate::{AreaTruth, Error, LightInfo, Measured, Pictures, Report, Truth};
+use crate::{AreaTruth, Error, LightInfo, Measured, Pictures, Report, Spots, Truth};
 use askama::Template;
 use serde::Serialize;
 
@@ -36,17 +38,11 @@ pub(super) struct Html<'a> {
     undefined: bool,
     flicker: bool,
     noise: bool,
+    timed: String,
     setup: Vec<(&'static str, String)>,
-    techniques: Vec<(String, &'static str)>,
-    codes: Vec<(String, String)>,
+    techniques: Vec<(Vec<String>, &'static str)>,
     notices: &'a [String],
     command: Option<&'a str>,
-}
-
-/// The result in a sentence: a name to emphasise, then the rest.
-pub(super) struct Finding {
-    pub(super) name: String,
-    pub(super) rest: String,
 }
 
 /// A kind of picture that the viewer can show.
@@ -64,8 +60,12 @@ struct Shown<'a> {
     line: Line,
     wrong: Option<String>,
     best: bool,
-    /// The words of the result's specification, each with a sentence that explains it.
-    description: Vec<(String, &'static str)>,
+    /// What the words of the result's specification mean, for a tooltip.
+    meaning: String,
+    /// The Rust code that makes the technique; empty if the specification is not a technique.
+    code: String,
+    /// The command that renders the technique in this view.
+    render: String,
     /// The figures below the name on the result's card.
     figures: Vec<(&'static str, String)>,
     /// Links to the pictures that the card does not show: label and file.
@@ -73,6 +73,11 @@ struct Shown<'a> {
 }
 
 impl Pictures {
+    /// Where the picture is most visibly wrong, column and row.
+    pub(super) fn worst_spot(&self) -> Option<[u32; 2]> {
+        self.spots.as_ref()?.worst()
+    }
+
     /// The kind and the name of each file.
     pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let always = [("color", &self.color), ("visibility", &self.visibility)];
@@ -87,12 +92,39 @@ impl Pictures {
     }
 }
 
+/// The technique that was executed, as text.
+fn executed(result: &Measured) -> &str {
+    result.technique.as_deref().unwrap_or(&result.shadows)
+}
+
+/// What executed a technique, with the name of the GPU.
+fn executor(result: &Measured) -> String {
+    match &result.device {
+        Some(device) => format!("{} ({device})", result.backend),
+        None => result.backend.clone(),
+    }
+}
+
+/// A sentence that says what the times were measured on.
+fn timed(report: &Report) -> String {
+    let mut executors: Vec<String> = report.results.iter().map(executor).collect();
+    executors.sort();
+    executors.dedup();
+    let on = match &executors[..] {
+        [one] if one == "reference" => {
+            "rays on the CPU, which are no measure of what a renderer takes".to_owned()
+        }
+        all => all.join(", "),
+    };
+    format!("Times are wall-clock times of single frames on this machine, drawn by {on}.")
+}
+
 impl<'a> Html<'a> {
     pub(super) fn new(page: &Page<'a>) -> Result<Self, Error> {
         let Page { report, truth, pictures, scale, notices, command } = *page;
         let columns = table::columns(&report.results.iter().collect::<Vec<_>>());
         let rows = table::rows(&columns, &report.results);
-        let best = best(report);
+        let finding = finding::of_report(report);
         let results: Vec<Shown<'a>> = report
             .results
             .iter()
@@ -106,8 +138,10 @@ impl<'a> Html<'a> {
                 cells,
                 line,
                 wrong: result.metrics.wrong_fraction.map(percent),
-                best: best == Some(i),
-                description: umbrage::language::explain(&result.shadows),
+                best: finding.best == Some(i),
+                meaning: meaning(&result.shadows),
+                code: code(executed(result)).unwrap_or_default(),
+                render: command::render_as(report, executed(result)),
                 figures: figures(result),
                 more: pictures
                     .files()
@@ -131,7 +165,7 @@ impl<'a> Html<'a> {
             size: report.size,
             small: w < 480,
             facts: format!("{w} × {h} pixels · {}", plural(n, "technique")),
-            finding: finding(report, best),
+            finding,
             kinds,
             truth,
             truth_how: truth_how(report),
@@ -146,59 +180,11 @@ impl<'a> Html<'a> {
             noise: report.results.iter().any(|r| r.noise.is_some()),
             setup: setup(report),
             techniques: techniques(report.results.iter().map(|r| r.shadows.as_str())),
-            codes: codes(
-                report
-                    .results
-                    .iter()
-                    .map(|r| (r.shadows.as_str(), r.technique.as_deref().unwrap_or(&r.shadows))),
-            ),
+            timed: timed(report),
             notices,
             command,
         })
     }
-}
-
-/// The index of the result with the fewest wrong pixels and, among several of these, the smallest
-/// mean error; `None` if there is only one result.
-fn best(report: &Report) -> Option<usize> {
-    let figures = |r: &Measured| Some((r.metrics.wrong_fraction?, r.metrics.mean_abs_error?));
-    let known = report.results.iter().enumerate().filter_map(|(i, r)| Some((i, figures(r)?)));
-    let best = known.min_by(|(_, a), (_, b)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    best.map(|(i, _)| i).filter(|_| report.results.len() > 1)
-}
-
-fn finding(report: &Report, best: Option<usize>) -> Finding {
-    let wrong = |r: &Measured| r.metrics.wrong_fraction.unwrap_or(0.0);
-    let say = |r: &Measured, rest| Finding { name: r.shadows.clone(), rest };
-    let first = &report.results[0];
-    if first.metrics.counted == 0 {
-        return Finding {
-            name: String::new(),
-            rest: "No pixel shows a surface that faces the light, so there is nothing to measure."
-                .to_owned(),
-        };
-    }
-    let Some(best) = best.map(|i| &report.results[i]) else {
-        return say(
-            first,
-            format!("shows {} % of the counted pixels wrong.", percent(wrong(first))),
-        );
-    };
-    let worst = report.results.iter().max_by(|a, b| wrong(a).total_cmp(&wrong(b))).unwrap_or(best);
-    let closest = format!("comes closest to the truth: {} % of", percent(wrong(best)));
-    let rest = if wrong(worst) == wrong(best) {
-        format!("{closest} the counted pixels are wrong, as with all the others.")
-    } else if wrong(best) == 0.0 {
-        let worst = format!("{} gets {} % wrong", worst.shadows, percent(wrong(worst)));
-        format!("comes closest to the truth: no counted pixel is wrong; {worst}.")
-    } else {
-        let times = significant(wrong(worst) / wrong(best));
-        format!(
-            "{closest} the counted pixels are wrong. {} gets {times} times as many.",
-            worst.shadows
-        )
-    };
-    say(best, rest)
 }
 
 fn counted(report: &Report) -> String {
@@ -257,11 +243,13 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
     let e = &r.error_px;
     let times = r.ms.total().map(duration_ms);
     [
+        ("Light error", known(r.metrics.light_error)),
         ("Mean error", known(r.metrics.mean_abs_error)),
         ("ꟻLIP", known(r.metrics.flip)),
         ("px/texel, p50", known(e.p50)),
         ("px/texel, p95", known(e.p95)),
         ("px/texel, max", known(e.max)),
+        ("p95 without slope", known(r.perspective_px.p95)),
         ("Storage factor", known(r.storage_factor)),
         (
             "Casters culled",
@@ -273,7 +261,7 @@ fn figures(r: &Measured) -> Vec<(&'static str, String)> {
         ("Texels", Some(count(r.texels))),
         ("Memory", r.bytes.map(|b| format!("{} KiB", count(b.div_ceil(1024))))),
         ("Time", times),
-        ("Executed by", Some(r.backend.clone())),
+        ("Executed by", Some(executor(r))),
     ]
     .into_iter()
     .filter_map(|(name, figure)| Some((name, figure?)))
@@ -322,31 +310,32 @@ fn setup(report: &Report) -> Vec<(&'static str, String)> {
     setup
 }
 
-/// The words of these specifications, each with a sentence that explains it, without repetitions.
+/// The words of these specifications, each with a sentence that explains it. Words that mean the
+/// same, such as `@1024` and `@2048`, stand together.
 pub(super) fn techniques<'a>(
     specifications: impl Iterator<Item = &'a str>,
-) -> Vec<(String, &'static str)> {
-    let mut techniques: Vec<(String, &'static str)> = Vec::new();
-    for shadows in specifications {
-        for (word, text) in umbrage::language::explain(shadows) {
-            if techniques.iter().all(|(_, known)| *known != text) {
-                techniques.push((word, text));
-            }
+) -> Vec<(Vec<String>, &'static str)> {
+    let mut techniques: Vec<(Vec<String>, &'static str)> = Vec::new();
+    for (word, text) in specifications.flat_map(umbrage::language::explain) {
+        match techniques.iter_mut().find(|(_, known)| *known == text) {
+            None => techniques.push((vec![word], text)),
+            Some((words, _)) if !words.contains(&word) => words.push(word),
+            Some(_) => {}
         }
     }
     techniques
 }
 
-/// For each specification, the Rust code that constructs its technique.
-pub(super) fn codes<'a>(
-    techniques: impl Iterator<Item = (&'a str, &'a str)>,
-) -> Vec<(String, String)> {
-    techniques
-        .filter_map(|(shadows, technique)| {
-            let technique: umbrage::Technique = technique.parse().ok()?;
-            Some((shadows.to_owned(), technique.rust_code()))
-        })
-        .collect()
+/// What the words of a specification mean, one a line.
+pub(super) fn meaning(shadows: &str) -> String {
+    let words = umbrage::language::explain(shadows);
+    let lines: Vec<String> = words.iter().map(|(word, text)| format!("{word}: {text}")).collect();
+    lines.join("\n")
+}
+
+/// The Rust code that constructs a technique; `None` if the text is not one.
+pub(super) fn code(technique: &str) -> Option<String> {
+    Some(technique.parse::<umbrage::Technique>().ok()?.rust_code())
 }
 
 /// The data that the script needs, as JSON that is safe inside an HTML `script` element.
@@ -355,6 +344,8 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
     struct Data<'a> {
         size: [u32; 2],
         kinds: &'a [Kind],
+        /// Where the magnifier opens.
+        spot: Option<[u32; 2]>,
         /// The truth, followed by the results.
         items: Vec<Item<'a>>,
     }
@@ -368,13 +359,16 @@ fn data(page: &Page<'_>, kinds: &[Kind]) -> Result<String, Error> {
     let item = |name, wrong: Option<f64>, pictures: &Pictures| Item {
         name,
         wrong: wrong.map(percent),
-        spot: pictures.worst_spot,
+        spot: pictures.worst_spot(),
         files: pictures.files().map(|(kind, file)| (kind, url(file))).collect(),
     };
     let results = page.report.results.iter().zip(page.pictures);
     let items = std::iter::once(item("Truth", None, page.truth))
         .chain(results.map(|(r, p)| item(&r.shadows, r.metrics.wrong_fraction, p)));
-    let data = Data { size: page.report.size, kinds, items: items.collect() };
+    let spots: Vec<&Spots> = page.pictures.iter().filter_map(|p| p.spots.as_ref()).collect();
+    let worst = || page.pictures.iter().find_map(Pictures::worst_spot);
+    let spot = Spots::most_different(&spots).or_else(worst);
+    let data = Data { size: page.report.size, kinds, spot, items: items.collect() };
     // A `<` in a string could close the element or open a comment.
     Ok(serde_json::to_string(&data)?.replace('<', "\\u003c"))
 }
@@ -392,29 +386,6 @@ pub(super) fn url(file: &str) -> String {
 mod tests {
     use super::*;
     use crate::report::tests::report;
-
-    #[test]
-    fn finding_says_who_comes_closest() {
-        let say = |wrong: &[Option<f64>]| {
-            let report = report(wrong);
-            let finding = finding(&report, best(&report));
-            format!("{} {}", finding.name, finding.rest)
-        };
-        assert_eq!(
-            say(&[Some(0.2), Some(0.05), Some(0.1)]),
-            "lambda=1@1024 comes closest to the truth: 5.00 % of the counted pixels are wrong. \
-             lambda=0@1024 gets 4.00 times as many."
-        );
-        assert_eq!(
-            say(&[Some(0.2), Some(0.0)]),
-            "lambda=1@1024 comes closest to the truth: no counted pixel is wrong; lambda=0@1024 gets \
-             20.0 % wrong."
-        );
-        assert_eq!(say(&[Some(0.5)]), "lambda=0@1024 shows 50.0 % of the counted pixels wrong.");
-        assert!(say(&[Some(0.1), Some(0.1)]).ends_with("wrong, as with all the others."));
-        assert!(say(&[Some(0.0), Some(0.0)]).contains(": 0 % of the counted pixels are wrong"));
-        assert!(say(&[None, None]).contains("nothing to measure"));
-    }
 
     #[test]
     fn setup_tells_where_light_comes_from() {
