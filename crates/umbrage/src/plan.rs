@@ -132,8 +132,8 @@ impl Plan {
     /// The visibility to show at a world point where the maps give `visibility`: a lookup's last
     /// step, in which shadows [fade out](Self::fade).
     pub fn faded(&self, world_position: DVec3, visibility: f64) -> f64 {
-        let share = self.fade.map_or(1.0, |fade| fade.share_left(world_position - self.origin));
-        1.0 - share + share * visibility
+        let left = self.fade.map_or(1.0, |fade| fade.share_left(world_position - self.origin));
+        visibility + (1.0 - left) * (1.0 - visibility)
     }
 
     /// Indices of the maps that serve a world point under a light, each with its share of the

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 use umbrage::visibility::statistic::{Csm, Statistic, Vsm};
 use umbrage::visibility::{
-    Blur, Filter, LightSize, Pattern, Prefilter, Width, texel_coordinates, visibility,
+    Blur, Filter, LightSize, Pattern, Prefilter, Width, slack, texel_coordinates, visibility,
 };
 use umbrage::{Bounds, Faces, Plan, Planner, Technique};
 use umbrage_testing::needs;
@@ -380,8 +380,8 @@ fn receivers_and_weights_are_those_of_rust() {
                     let error = (out.slope.as_dvec2() - slope).length();
                     assert!(error < 2e-3 * slope.length() + 1e-5, "{out:?} {slope}");
                     let metre = 1e-2 * depth_per_metre(map, p);
-                    let slack = r.half_texel * if bias == extra { 1.5 } else { 1.0 }
-                        + if bias == extra { metre } else { 0.0 };
+                    let more = if bias == extra { 0.5 * r.half_texel + metre } else { 0.0 };
+                    let slack = slack(map, &r) + more;
                     let error = (f64::from(out.slack) - slack).abs();
                     assert!(error < 1e-3 * slack + 1e-6, "{out:?} {slack}");
                 }

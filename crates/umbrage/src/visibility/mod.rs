@@ -6,7 +6,7 @@
 //! plane is known exactly at a texel's centre ([`Receiver::slope`]; this is receiver plane depth
 //! bias). A texel hides the receiver if its depth is less than
 //!
-//! > min(depth of that plane at the texel's centre, the receiver's own depth) − h − 2⁻²⁵
+//! > min(depth of that plane at the texel's centre, the receiver's own depth) − h − g − 2⁻²⁵
 //!
 //! - The plane's depth alone is exact for plane surfaces. Where the surface bends away from the
 //!   light within a texel, however, texels deeper than the receiver would hide it; the minimum
@@ -15,6 +15,10 @@
 //!   a surface bends towards the light within a texel, it rises above the receiver's plane. A map
 //!   resolves nothing smaller than its texels, so it cannot distinguish such a rise from an
 //!   occluder this near.
+//! - g is the rise of the receiver's plane over 1/256 of a texel in s and in t. Rasterisers move the
+//!   corners of triangles to a grid as fine as that. Where the light grazes a surface, all of its
+//!   depths may lie within a few texels, and it would shadow itself if it is drawn beside its place.
+//!   Elsewhere g is much less than h. [`slack`] is the sum of both.
 //! - 2⁻²⁵ is half a unit in the last place of depths stored in single precision.
 //!
 //! Casters in front of the receivers are clamped to depth 0 and must hide every receiver. The limit
@@ -34,7 +38,7 @@
 //! A [`Prefilter`] is applied ahead of lookup. It stores [statistics](statistic) of depth, whose
 //! means over many texels determine the lit share. A blur whose width is given in texels is done
 //! once for each map, and lookup is one bilinear sample. A blur whose width is given in pixels or
-//! metres takes several samples of the map's smaller mip levels. The slack h + 2⁻²⁵ applies to
+//! metres takes several samples of the map's smaller mip levels. The slack h + g applies to
 //! both. A statistic that cannot distinguish the receiver's own slanted plane from occluders also
 //! allows for a multiple of the standard deviation of that plane's depth over the filter.
 
@@ -56,6 +60,9 @@ use statistic::Channels;
 
 /// Half a unit in the last place of single precision for numbers just below 1.
 const HALF_ULP: f64 = f32::EPSILON as f64 / 4.0;
+
+/// The grid to which rasterisers move the corners of triangles, texels.
+const RASTER_GRID: f64 = 1.0 / 256.0;
 
 /// Gutter of filters whose width in texels is unbounded, texels. They read the gutter's last texel
 /// in place of texels beyond it.
@@ -305,6 +312,16 @@ pub fn shadow_coordinates(map: &ShadowMap, texel: DVec2) -> DVec2 {
     DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height))
 }
 
+/// How much less than on the receiver's plane the depth of a texel must be to hide the receiver, but
+/// for rounding: h + g as in the [module's documentation](self).
+pub fn slack(map: &ShadowMap, receiver: &Receiver) -> f64 {
+    let [width, height] = map.resolution.map(f64::from);
+    let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
+    let rise = RASTER_GRID * (receiver.slope / texels).abs().element_sum();
+    // All depths lie within 1. `min` ignores NaN.
+    receiver.half_texel + rise.min(1.0)
+}
+
 /// The share of the light that reaches `receiver`, 0 ..= 1, from the texels of `map`. `texels` is a
 /// function from (i, j) to depth, or a type that also stores prefiltered statistics; it is asked
 /// for texels up to [`Filter::reach_texels`] outside the map. Receivers outside the map or in front
@@ -428,7 +445,7 @@ struct Test<'a> {
 
 impl<'a> Test<'a> {
     fn new(map: &'a ShadowMap, receiver: &'a Receiver) -> Self {
-        Self { map, receiver, slack: receiver.half_texel + HALF_ULP }
+        Self { map, receiver, slack: slack(map, receiver) + HALF_ULP }
     }
 
     /// Shadow coordinates of texel (i, j)'s centre.

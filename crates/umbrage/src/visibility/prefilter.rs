@@ -1,5 +1,5 @@
 use super::statistic::{Channels, MAX_CHANNELS, Statistic};
-use super::{Width, shadow_coordinates};
+use super::{Width, shadow_coordinates, slack};
 use crate::error::{Error, check};
 use crate::plan::{Receiver, ShadowMap, Slab};
 use glam::DVec2;
@@ -302,7 +302,7 @@ impl Prefilter {
         channels: &Channels,
     ) -> f32 {
         let [width, height] = map.resolution.map(f64::from);
-        let expected = receiver.depth.min(1.0) - receiver.half_texel;
+        let expected = receiver.depth.min(1.0) - slack(map, receiver);
         // Where the receiver is edge-on to the light its slope is infinite. Since all depths lie
         // within 1, a slope of 8 per texel has the same effect.
         let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));
