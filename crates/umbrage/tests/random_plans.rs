@@ -21,7 +21,7 @@ use proptest::test_runner::TestRunner;
 use std::collections::BTreeMap;
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{
-    Aabb, Bounds, BoxTree, Error, Limits, Objective, Planner, Size, Splits, Technique, Warp,
+    Aabb, Bounds, BoxTree, Error, Limits, Objective, Plan, Planner, Size, Splits, Technique, Warp,
 };
 
 /// Everything that a plan is made for.
@@ -150,7 +150,7 @@ impl Case {
         {
             let uniform = Technique { warp: Warp::Uniform, ..*technique };
             if let Ok(uniform) = planned(&uniform) {
-                let [adaptive, uniform] = [&plan, &uniform].map(|p| p.storage_factor());
+                let [adaptive, uniform] = [&plan, &uniform].map(Plan::storage_factor);
                 if adaptive > uniform * common::ADAPTIVE_OVER_UNIFORM {
                     let what = format!("{adaptive} > {uniform}, by {}", adaptive / uniform);
                     return Err(Fault { kind: "adaptive needs more than uniform", what });

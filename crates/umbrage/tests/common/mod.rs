@@ -661,7 +661,7 @@ pub(crate) fn check_numbers(plan: &Plan) -> Result<(), Fault> {
             if is_right { Ok(()) } else { Err(Fault { kind, what: format!("{map:?}") }) }
         };
         let matrices = [map.shadow_from_local, map.local_from_shadow];
-        check(matrices.iter().all(|m| m.is_finite()), "matrices not finite")?;
+        check(matrices.iter().all(glam::DMat4::is_finite), "matrices not finite")?;
         check(map.shadow_from_local_f32().is_finite(), "matrix not finite in single precision")?;
         check(map.lambda.is_none_or(|l| l > 0.0 && l.is_finite()), "lambda")?;
         check(map.split.iter().all(|d| d.is_finite()), "split")?;
