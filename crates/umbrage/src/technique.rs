@@ -114,9 +114,9 @@ impl Cover {
 ///
 /// In orthographic views a pixel has the same width at every depth. `Psm`, `Lispsm`, `Tsm` and `Log`,
 /// which undo the viewer's perspective, are then `Uniform`; the λ of their rules tends to infinity as
-/// a perspective view recedes. Under parallel light no warp needs fewer texels than none, and
-/// `Adaptive` finds that. Under a lamp texels grow with the distance from the lamp, and it may still
-/// warp. `Lambda` does what it says.
+/// a perspective view recedes. So is `Adaptive` under parallel light, where texels of every even map
+/// are as good as each other. Under a lamp texels grow with the distance from the lamp, and it may
+/// still warp. `Lambda` does what it says.
 ///
 /// Where the view runs exactly along the light, the view direction does not define a z axis. While
 /// the view sweeps past the light direction, every map therefore makes half a turn, `Uniform`
@@ -161,10 +161,12 @@ pub enum Warp {
 }
 
 impl Warp {
-    /// The warp for views without a perspective, in which all pixels have the same width.
-    pub(crate) fn without_perspective(self) -> Self {
+    /// The warp for views without a perspective, in which all pixels have the same width. Under
+    /// parallel light all texels of even maps have the same width, too.
+    pub(crate) fn without_perspective(self, is_light_parallel: bool) -> Self {
         match self {
             Self::Psm | Self::Lispsm | Self::Tsm { .. } | Self::Log => Self::Uniform,
+            Self::Adaptive(_) if is_light_parallel => Self::Uniform,
             Self::Uniform | Self::Adaptive(_) | Self::Lambda(_) => self,
         }
     }

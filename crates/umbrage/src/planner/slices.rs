@@ -4,6 +4,7 @@ use super::{Draft, Planner, Request};
 use crate::bounds::Plane;
 use crate::casters::caster_planes;
 use crate::focus::Body;
+use crate::light::Projector;
 use crate::math::range;
 use crate::partition::{self, Along};
 use crate::plan::{Face, Part};
@@ -34,7 +35,8 @@ impl Planner {
         let technique = request.technique;
         let (mut partition, mut warp) = (technique.partition, technique.warp);
         if request.camera.is_orthographic() {
-            warp = warp.without_perspective();
+            let is_parallel = matches!(request.projector, Projector::Directional { .. });
+            warp = warp.without_perspective(is_parallel);
         }
         if part.face == Some(Face::Near) {
             // All pixels on the near face have the same width, so it needs neither slices nor a

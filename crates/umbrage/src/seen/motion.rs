@@ -147,7 +147,9 @@ impl Buffers {
         boxes: &[Aabb],
         clearance: f64,
     ) {
-        let nearest = camera.near().max(clearance);
+        // Orthographic views may begin behind the eye, where a clearance of 0 says nothing.
+        let near = camera.near();
+        let nearest = if clearance > 0.0 { near.max(clearance) } else { near };
         box_depths(camera, [nearest, camera.far()], boxes, &mut self.boxes);
         let before = seen.camera();
         let t = camera.eye() - before.eye();
