@@ -39,7 +39,7 @@ fn moved(meshes: Vec<Mesh>, world_from_mesh: DAffine3) -> Scene {
 /// True visibility of the pixels that count, and that of an executed plan; `None` elsewhere.
 fn pictures(view: &View<'_>) -> [Vec<Option<f32>>; 2] {
     let tracer = view.tracer();
-    let size = Size::Budget(400 * 400);
+    let size = Size::Budget(200 * 200);
     let technique = Technique { warp: Warp::Uniform, size, ..Technique::default() };
     let plan = plan(tracer.scene(), view.camera(), *view.light(), &technique);
     let reference = Reference::render(tracer, &plan, &nobody).unwrap();
