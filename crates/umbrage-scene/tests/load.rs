@@ -443,8 +443,8 @@ fn broken_files_say_what_is_wrong_and_where() {
         (t().set("/meshes/0/primitives/0/indices", json!(0)), "must be unsigned integers"),
         (t().set("/meshes/0/primitives/0/material", json!(5)), "there is no materials[5]"),
         (t().set("/meshes/0/primitives/0/mode", json!(77)), "mode is unknown"),
-        (t().set("/accessors/0/count", json!(4)), "4 elements from byte 0 on do not fit"),
-        (t().set("/accessors/0/count", json!(u64::MAX)), "do not fit"),
+        (t().set("/accessors/3/count", json!(4)), "4 elements from byte 0 on do not fit"),
+        (t().set("/accessors/3/count", json!(u64::MAX)), "do not fit"),
         (t().set("/accessors/0/byteOffset", json!(u64::MAX)), "do not fit"),
         (t().set("/accessors/0/componentType", json!(1)), "componentType is unknown"),
         (t().set("/accessors/1/count", json!(2)), "has 3 positions but 2 normals"),
@@ -492,6 +492,7 @@ fn broken_files_say_what_is_wrong_and_where() {
 fn sparse_accessors_are_filled_in_or_refused() {
     let sparse = |at: u16, count: u64| {
         let mut file = File::triangle();
+        file.primitive()["attributes"] = json!({"POSITION": 0});
         let indices = file.view(&at.to_le_bytes());
         let values = file.view(&[0u8, 0, 0x40, 0x40].repeat(3));
         file.json["accessors"][0] = json!({

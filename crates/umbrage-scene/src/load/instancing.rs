@@ -53,19 +53,16 @@ impl Copies {
     ) -> Result<Self, SceneError> {
         let Accessors { translation, rotation, scale } = accessors(document, node, place)?;
         let place = format!("{place}.extensions.{NAME}");
+        for id in [translation, rotation, scale].into_iter().flatten() {
+            if document.get(id, &place)?.count.0 != len as u64 {
+                let problem = "its attributes have different numbers of elements";
+                return Err(document.invalid(&place, problem));
+            }
+        }
         let vectors = |id: Option<_>| id.map(|i| document.floats::<3>(i, &place)).transpose();
         let translations = vectors(translation)?;
         let rotations = rotation.map(|i| document.floats::<4>(i, &place)).transpose()?;
         let scales = vectors(scale)?;
-        let lengths = [
-            translations.as_ref().map(Vec::len),
-            rotations.as_ref().map(Vec::len),
-            scales.as_ref().map(Vec::len),
-        ];
-        if lengths.into_iter().flatten().any(|other| other != len) {
-            let problem = "its attributes have different numbers of elements";
-            return Err(document.invalid(&place, problem));
-        }
         Ok(Self { place, translations, rotations, scales })
     }
 

@@ -74,6 +74,7 @@ pub(super) fn load(
         return Ok(None);
     };
     note_unread(primitive, place, wanted, notices);
+    check_counts(document, primitive, place, wanted, positions)?;
     let mut positions = vectors(document, positions, &format!("{place}.attributes.POSITION"))?;
     morph(document, primitive, place, wanted, Moved::Positions, &mut positions)?;
     let triangles = load_triangles(document, primitive, mode, place, &positions, notices)?;
@@ -101,21 +102,12 @@ pub(super) fn load(
         true => load_influences(document, primitive, place, notices)?,
         false => Vec::new(),
     };
-    let n = positions.len();
-    let joints = influences.iter().map(|set| ("joints", set.joints.len()));
-    let weights = influences.iter().map(|set| ("joint weights", set.weights.len()));
-    let lists =
-        [("normals", normals.len()), ("texture coordinates", uvs.len()), ("colours", alphas.len())];
-    for (what, found) in lists.into_iter().filter(|l| l.1 > 0).chain(joints).chain(weights) {
-        if found != n {
-            return Err(document.invalid(place, format!("has {n} positions but {found} {what}")));
-        }
-    }
 
+    let count = positions.len() as u64;
+    document.budget.take(place, count, "vertices", size_of::<u32>() + size_of::<usize>())?;
     let material = wanted.material;
     let mesh = Mesh { positions, normals, uvs, alphas, triangles, material };
     let mut loaded = Loaded { mesh, influences };
-    document.budget.take(place, n as u64, "vertices", size_of::<u32>() + size_of::<usize>())?;
     drop_unused_vertices(&mut loaded, place, notices);
     let mesh = &mut loaded.mesh;
     if mesh.normals.is_empty() {
@@ -158,6 +150,39 @@ fn note_unread(primitive: &Primitive, place: &str, wanted: &Wanted<'_>, notices:
     if targets != wanted.morph_weights.len() && !wanted.morph_weights.is_empty() {
         notices.add(place, "has not one weight for each morph target, missing ones count as 0");
     }
+}
+
+/// Checks that the attributes to read have as many elements as there are positions, before they are
+/// read: without data they could have any number.
+fn check_counts(
+    document: &Document,
+    primitive: &Primitive,
+    place: &str,
+    wanted: &Wanted<'_>,
+    positions: Index<Accessor>,
+) -> Result<(), SceneError> {
+    // An index that points nowhere is told when it is read.
+    let count = |id: &Index<Accessor>| document.root.accessors.get(id.value()).map(|a| a.count.0);
+    for (semantic, id) in &primitive.attributes {
+        let what = match semantic {
+            Checked::Valid(Semantic::Normals) => "normals",
+            Checked::Valid(Semantic::TexCoords(set))
+                if wanted.tex_coords.is_some_and(|coords| coords.set == *set) =>
+            {
+                "texture coordinates"
+            }
+            Checked::Valid(Semantic::Colors(0)) if wanted.is_masked => "colours",
+            Checked::Valid(Semantic::Joints(_)) if wanted.is_skinned => "joints",
+            Checked::Valid(Semantic::Weights(_)) if wanted.is_skinned => "joint weights",
+            _ => continue,
+        };
+        if let (Some(n), Some(found)) = (count(&positions), count(id))
+            && found != n
+        {
+            return Err(document.invalid(place, format!("has {n} positions but {found} {what}")));
+        }
+    }
+    Ok(())
 }
 
 /// The triangles of a primitive, all with the same winding, and all indices in range.
@@ -223,12 +248,13 @@ fn morph(
         };
         let Some(id) = id else { continue };
         let place = format!("{place}.targets[{k}].{name}");
-        let taken = document.budget.taken();
-        let steps = vectors(document, id, &place)?;
-        if steps.len() != values.len() {
-            let problem = format!("has {} elements for {} vertices", steps.len(), values.len());
+        let (n, found) = (values.len(), document.get(id, &place)?.count.0);
+        if found != n as u64 {
+            let problem = format!("has {found} elements for {n} vertices");
             return Err(document.invalid(&place, problem));
         }
+        let taken = document.budget.taken();
+        let steps = vectors(document, id, &place)?;
         for (value, step) in values.iter_mut().zip(steps) {
             *value = (value.as_dvec3() + step.as_dvec3() * f64::from(weight)).as_vec3();
         }
