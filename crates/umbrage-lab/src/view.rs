@@ -184,11 +184,10 @@ pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<Cho
                 look_at.near = near.min(look_at.far / 2.0);
             }
         }
+        let round = |metres: f64| format!("{metres:.2e}").parse().unwrap_or(metres);
         notices.extend(nearest.filter(|&nearest| nearest < look_at.near).map(|nearest| {
-            format!(
-                "the near plane, {:.3e} metres away, cuts surfaces away that begin at {nearest:.3e}",
-                look_at.near
-            )
+            let [near, nearest] = [look_at.near, nearest].map(round);
+            format!("the near plane at {near} m cuts surfaces away, which begin at {nearest} m")
         }));
     }
     let camera = Camera::look_at(look_at).map_err(Error::Planning)?;

@@ -385,6 +385,8 @@ fn a_sweeps_page_leads_to_its_views() {
             samples: 4,
             fit: "box".to_owned(),
             opaque: true,
+            without: Vec::new(),
+            ground: false,
             backend: "reference".to_owned(),
         },
         views: vec![
