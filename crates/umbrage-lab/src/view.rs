@@ -209,11 +209,10 @@ pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<Cho
                 view.near = near.min(view.far / 2.0);
             }
         }
+        let round = |metres: f64| format!("{metres:.2e}").parse().unwrap_or(metres);
         notices.extend(nearest.filter(|&nearest| nearest < view.near).map(|nearest| {
-            format!(
-                "the near plane, {:.3e} metres away, cuts surfaces away that begin at {nearest:.3e}",
-                view.near
-            )
+            let [near, nearest] = [view.near, nearest].map(round);
+            format!("the near plane at {near} m cuts surfaces away, which begin at {nearest} m")
         }));
     }
     let camera = view.camera(options.size).map_err(Error::Planning)?;
