@@ -136,7 +136,7 @@ fn judged_by(winner: &Judged, unit: CostUnit) -> String {
     let cost = winner.cost.map(|_| match unit {
         CostUnit::Milliseconds => {
             "by cost (the time of planning, drawing, filtering and lookup, in \
-             single frames here; `umbrage bench` measures it well)"
+             single frames here, which umbrage bench measures better)"
         }
         CostUnit::Kibibytes => {
             "by cost (the memory that lookups read, because times of this run say \

@@ -92,6 +92,12 @@ fn pictures_load_and_everything_fits_at_every_size() {
             check_pictures(&mut browser, report.size);
             check_fits(&mut browser, &format!("{name} at {window:?}"));
         }
+        if name == "many" {
+            browser.open(&index, [1440, 900], false);
+            let hidden = "(t => t.scrollWidth - t.clientWidth)\
+                          (document.querySelector('#measurements .table-scroll'))";
+            assert_eq!(browser.eval(hidden), json!(0), "the whole table shows at 1440 pixels");
+        }
     }
     check_quiet(&browser);
 }
@@ -262,13 +268,29 @@ fn magnifier_shows_the_same_place_of_all_techniques() {
 
 #[needs(browser)]
 #[test]
+fn magnifier_opens_where_techniques_differ() {
+    // Both are wrong everywhere, but one of them is right in the last square of the picture.
+    let mut compared = flat([640, 480], RED, &[("uniform", GREEN), ("lispsm", GREEN)]);
+    let last = |x, y| if x >= 608 && y >= 448 { RED } else { GREEN };
+    compared.results[1].color = umbrage_measure::Image::from_fn([640, 480], last).unwrap();
+    let (index, _) = report("opening", &compared);
+    let mut browser = Browser::start();
+    browser.open(&index, [1280, 1000], false);
+    browser.wait_for("document.querySelector('#reticle').ariaLabel !== null");
+    let label = browser.eval("document.querySelector('#reticle').ariaLabel");
+    assert!(label.as_str().unwrap().starts_with("Magnifier at column 624, row 464"), "{label}");
+    check_quiet(&browser);
+}
+
+#[needs(browser)]
+#[test]
 fn table_sorts_by_every_column() {
     let (index, report) = report("table", &spheres_on_a_plane([96, 54], 20));
     let mut browser = Browser::start();
     browser.open(&index, [1920, 1080], false);
     let columns = browser.eval("document.querySelectorAll('#table thead th').length");
     let columns = columns.as_u64().unwrap();
-    assert_eq!(columns, 17, "16 figures, for nobody has a filter time or flicker, beside the name");
+    assert_eq!(columns, 18, "17 figures, for nobody has a filter time or flicker, beside the name");
     let keys = |browser: &mut Browser, column: u64| -> Vec<String> {
         let keys = browser.eval(&format!(
             "[...document.querySelectorAll('#table tbody tr')].map(r => r.cells[{column}].dataset.key)"
@@ -297,11 +319,11 @@ fn table_sorts_by_every_column() {
             }
         }
     }
-    // The storage factor is the ninth figure, and a fifth of the techniques have none.
-    assert_eq!(keys(&mut browser, 9).iter().filter(|k| k.is_empty()).count(), 4);
+    // The storage factor is the tenth figure, and a fifth of the techniques have none.
+    assert_eq!(keys(&mut browser, 10).iter().filter(|k| k.is_empty()).count(), 4);
     // The technique with the fewest wrong pixels is highlighted.
     let best = "[...document.querySelectorAll('#table tbody tr')]\
-                .filter(r => r.cells[1].matches('.best')).map(r => Number(r.cells[1].dataset.key))";
+                .filter(r => r.cells[2].matches('.best')).map(r => Number(r.cells[2].dataset.key))";
     let best: Vec<f64> = serde_json::from_value(browser.eval(best)).unwrap();
     let wrong = report.results.iter().filter_map(|r| r.metrics.wrong_fraction);
     let least = wrong.fold(1.0, f64::min);
