@@ -194,7 +194,7 @@ fn at_a_fence() {
 #[needs(gpu)]
 #[test]
 fn under_a_lamp_flush_with_its_ceiling() {
-    let mut scene = scene("contacts");
+    let mut scene = scene("sphere:32");
     let bounds = scene.bounds();
     let height = (bounds.max.y + 1.37) as f32;
     let corner = |x: f64, z: f64| Vec3::new(x as f32, height, z as f32);
@@ -235,7 +235,11 @@ fn under_a_lamp_flush_with_its_ceiling() {
             samples.into_iter().filter(|s| s.is_facing).map(|s| s.visibility).collect::<Vec<_>>()
         });
         let dark = below.iter().filter(|&&v| v < 0.5).count();
-        assert!(below.len() > 3000 && dark > 30 && 2 * dark < below.len(), "{dark} dark");
+        assert!(
+            below.len() > 1000 && dark > 30 && 2 * dark < below.len(),
+            "{dark} of {}",
+            below.len()
+        );
         let differs = flush.iter().zip(&below).filter(|(a, b)| (*a - *b).abs() > 0.5).count();
         assert!(flush.len() == below.len() && 100 * differs < below.len(), "{filter}: {differs}");
     }
@@ -267,7 +271,7 @@ fn under_suns_at_the_horizon() {
         let by_rays = wrong(&|_, sample| reference.visibility(0, sample));
         let by_gpu = wrong(&|i, _| drawn[i].visibility);
         // The share is of all pixels, many of which face away from the sun.
-        let most = by_rays + drawn.len() / 1000;
+        let most = by_rays + drawn.len() / 500;
         assert!(by_gpu <= most, "{elevation_deg}°: {by_gpu} pixels, by rays {by_rays}");
     }
 }
