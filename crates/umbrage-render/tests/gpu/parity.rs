@@ -189,62 +189,6 @@ fn at_a_fence() {
     agrees("fence", [1, 4, 7]);
 }
 
-/// A ceiling that a lamp lies in is seen edge-on from the lamp and hides nothing. So the picture is
-/// that under a lamp one millimetre lower.
-#[needs(gpu)]
-#[test]
-fn under_a_lamp_flush_with_its_ceiling() {
-    let mut scene = scene("sphere:32");
-    let bounds = scene.bounds();
-    let height = (bounds.max.y + 1.37) as f32;
-    let corner = |x: f64, z: f64| Vec3::new(x as f32, height, z as f32);
-    let [low, high] = [bounds.min - 0.3, bounds.max + 0.7];
-    let positions = vec![
-        corner(low.x, low.z),
-        corner(low.x, high.z),
-        corner(high.x, high.z),
-        corner(high.x, low.z),
-    ];
-    let normals = vec![Vec3::NEG_Y; 4];
-    let triangles = vec![[0, 2, 1], [0, 3, 2]];
-    scene.meshes.push(Mesh { positions, normals, triangles, ..Mesh::default() });
-    let mesh = scene.meshes.len() - 1;
-    scene.instances.push(Instance { mesh, world_from_mesh: DAffine3::IDENTITY });
-    let set = Set::new(&scene, IMAGE);
-    let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
-    let middle = bounds.center();
-    let lamp = |lower: f64, is_point: bool| {
-        let position = DVec3::new(middle.x + 0.21, f64::from(height) - lower, middle.z - 0.13);
-        let (near, range) = (0.01, 100.0);
-        if is_point {
-            return Light::Point(PointLight { position, near, range });
-        }
-        let (direction, half_angle_rad) = (DVec3::NEG_Y, 1.2);
-        Light::Spot(SpotLight { position, direction, half_angle_rad, near, range })
-    };
-    for (is_point, filter) in [false, true].into_iter().zip([Filter::Hard, Filter::Pcf { n: 3 }]) {
-        let technique = technique("adaptive@512", filter);
-        let options = ShadowOptions { filter, ..ShadowOptions::default() };
-        let [flush, below] = [0.0, 0.001].map(|lower| {
-            let light = lamp(lower, is_point);
-            let plan = set.plan(&[light], &technique);
-            let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
-            let mut renderer = Renderer::new(&GPU, &buffers, &options).unwrap();
-            renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
-            let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
-            samples.into_iter().filter(|s| s.is_facing).map(|s| s.visibility).collect::<Vec<_>>()
-        });
-        let dark = below.iter().filter(|&&v| v < 0.5).count();
-        assert!(
-            below.len() > 1000 && dark > 30 && 2 * dark < below.len(),
-            "{dark} of {}",
-            below.len()
-        );
-        let differs = flush.iter().zip(&below).filter(|(a, b)| (*a - *b).abs() > 0.5).count();
-        assert!(flush.len() == below.len() && 100 * differs < below.len(), "{filter}: {differs}");
-    }
-}
-
 /// Where the light grazes the ground, all depths of the ground lie within less than a texel of a
 /// map, and the rasteriser may draw it beside its place. The ground does not shadow itself there.
 #[needs(gpu)]

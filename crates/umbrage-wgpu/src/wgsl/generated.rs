@@ -209,7 +209,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {{
     var sum = 0.0;
     var depths: vec4f;
     var lit: vec4f;
-{fours}    return sum * {share:?};
+{fours}    return min(sum * {share:?}, 1.0);
 }}
 ",
         shift = match f64::from(middle + 1) - 0.5 * f64::from(n) {
@@ -255,7 +255,7 @@ fn shadow_filtered(map: u32, receiver: ShadowReceiver) -> f32 {{
     let first = floor(start);
     let fraction = start - first;
     var sum = 0.0;
-{fours}    return sum * {share:?};
+{fours}    return min(sum * {share:?}, 1.0);
 }}
 ",
         half = 0.5 * f64::from(n),
