@@ -63,10 +63,16 @@ impl<'a> TrianglePlane<'a> {
     }
 
     /// Whether a lamp at this world position may lie in the plane, which then hides none of its
-    /// light. The lamp's position was stored in single precision as well.
+    /// light.
     pub(crate) fn holds_lamp(&self, lamp: DVec3) -> bool {
+        self.distance(lamp) <= self.lamp_error(lamp)
+    }
+
+    /// Bound of the errors in a lamp's distance from the plane, metres. The lamp's position was
+    /// stored in single precision as well.
+    pub(crate) fn lamp_error(&self, lamp: DVec3) -> f64 {
         let stored = self.stored_error(self) + self.across(self.world_normal, lamp);
-        self.distance(lamp) <= self.computed_error(lamp) + stored.min(self.largest_shift())
+        self.computed_error(lamp) + stored.min(self.largest_shift())
     }
 
     fn holds_corners_of(&self, other: &TrianglePlane<'_>, largest: f64) -> bool {

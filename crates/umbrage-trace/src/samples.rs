@@ -35,7 +35,8 @@ pub struct Sample {
     /// Whether the visible side of the triangle faces the light and lies within the light's reach
     /// (a spot or point light's range, a spot light's cone). If not, the sample is dark whatever
     /// any shadow map says. The geometric normal decides, because triangles are what casts and
-    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp does not face it.
+    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp faces it, as if the lamp
+    /// were a little on the visible side.
     pub is_facing: bool,
 }
 
@@ -161,9 +162,9 @@ impl<'a> View<'a> {
         let to_light = self.light.direction_to_light(position);
         // Whether a plane that holds the lamp faces it would depend on the last bit of each point.
         let is_edge_on = |lamp| self.tracer.is_edge_on(primitive, lamp);
-        normal.dot(to_light) > 0.0
-            && self.light.reaches(position)
-            && !self.light.position().is_some_and(is_edge_on)
+        let is_towards =
+            normal.dot(to_light) > 0.0 || self.light.position().is_some_and(is_edge_on);
+        is_towards && self.light.reaches(position)
     }
 
     /// Whether the shadow on a surface counts where pictures are compared: it [faces the

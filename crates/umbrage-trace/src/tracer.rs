@@ -372,7 +372,8 @@ impl<'a> Tracer<'a> {
     /// The surface does not hide itself, as with [`occluded_from`](Self::occluded_from). A triangle
     /// whose plane holds the lamp is seen edge-on from it and hides nothing either, such as the
     /// ceiling that a downlight is flush with. Whether the plane holds the lamp is decided within
-    /// the errors of stored coordinates, so a housing casts however near to the lamp it is.
+    /// the errors of stored coordinates, so a housing casts however near to the lamp it is. Light
+    /// reaches such a triangle itself along its visible side.
     pub fn hidden_from_lamp(&self, surface: &Surface, lamp: DVec3) -> bool {
         self.hidden_among(None, surface, lamp)
     }
@@ -384,8 +385,17 @@ impl<'a> Tracer<'a> {
         surface: &Surface,
         lamp: DVec3,
     ) -> bool {
-        let ends = Ends { departure: Some(surface), lamp: Some(lamp) };
-        self.any(among, surface.ray(lamp - surface.position), [0.0, 1.0], ends, CASTS)
+        let own = self.plane(surface.primitive);
+        let mut ray = surface.ray(lamp - surface.position);
+        let mut ends = Ends { departure: Some(surface), lamp: Some(lamp) };
+        if own.holds_lamp(lamp) {
+            // The light grazes the surface. Rounding must not decide on which side of it the ray
+            // runs, for on the other one may be the body that the surface belongs to.
+            let beside = 2.0 * (own.lamp_error(lamp) + surface.position_error);
+            ray.origin += surface.geometric_normal * beside;
+            ends.departure = None;
+        }
+        self.any(among, ray, [0.0, 1.0], ends, CASTS)
     }
 
     /// Whether a triangle is seen edge-on from a lamp, because its plane holds the lamp as far as

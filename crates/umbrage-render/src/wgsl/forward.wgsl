@@ -167,16 +167,17 @@ fn to_light(position: vec3f) -> vec3f {
     return normalize_or_zero(view.light_position - position);
 }
 
-// Whether the light reaches a surface if nothing lies between them. A surface that is edge-on to the
-// light as far as single precision can tell does not face it, for whether it does would change from
-// pixel to pixel.
+// Whether the light reaches a surface if nothing lies between them. Whether a surface that is
+// edge-on to the light faces it would change from pixel to pixel in single precision. Such a surface
+// faces a lamp, whose light grazes it, and does not face a sun.
 fn faces_light(position: vec3f, normal: vec3f, normal_error: f32) -> bool {
     let light = to_light(position);
-    if (dot(normal, light) <= normal_error) {
-        return false;
-    }
+    let cosine = dot(normal, light);
     if (view.light_kind == DIRECTIONAL) {
-        return true;
+        return cosine > normal_error;
+    }
+    if (cosine <= -normal_error) {
+        return false;
     }
     let is_in_cone = -dot(view.light_direction, light) >= view.light_cosine;
     return is_in_cone && distance_from_lamp(position) <= view.light_range;
