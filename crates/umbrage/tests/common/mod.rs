@@ -115,7 +115,7 @@ fn camera_with(
                 Some((height, before_eye)) => {
                     let length = far - near;
                     let near = near.min(length) * before_eye;
-                    let (height, far) = (height * length, near + length);
+                    let (height, far) = ((height * length).max(1e-9), near + length);
                     Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
                 }
             };
