@@ -26,8 +26,12 @@ const LOWEST: f64 = 0.1;
 /// horizon, far away. Nothing stands on it. So a room, whose floor carries what is in it, is none,
 /// and neither is vast ground, nor a valley.
 pub(crate) fn find(scene: &mut Scene, has_lamps: bool) {
-    let boxes = scene.instance_boxes();
     let families = families(scene);
+    let is_part = |&n: &usize| !families[n].is_empty() && families[n].len() < scene.instances.len();
+    if !(0..families.len()).any(|n| is_part(&n)) {
+        return;
+    }
+    let boxes = scene.instance_boxes();
     let far = if has_lamps { FAR_FROM_LAMPS } else { FAR };
     // The boxes around all instances before and after each place in the list.
     let before = unions(boxes.iter());
@@ -47,7 +51,6 @@ pub(crate) fn find(scene: &mut Scene, has_lamps: bool) {
             && surrounds(scene, family, rest, far)
     };
     // Of nodes that draw the same, the topmost is the sky, whose name says most.
-    let is_part = |&n: &usize| !families[n].is_empty() && families[n].len() < boxes.len();
     let sky = (0..families.len()).filter(is_part).find(is_sky);
     scene.sky = sky;
     if let Some(sky) = sky {

@@ -7,6 +7,9 @@ use glam::DVec3;
 /// Surfaces count as one plane if the cosine of the angle between their normals is above this value.
 const SAME_PLANE: f64 = 0.99;
 
+/// One sample of each square of this many by this many is in the first look at a pixel.
+const FIRST_LOOK: u32 = 2;
+
 /// Memory for the work on one pixel after another.
 #[derive(Default)]
 pub struct PixelMemory {
@@ -16,13 +19,15 @@ pub struct PixelMemory {
 }
 
 impl View<'_> {
-    /// The mean true visibility over all samples of the pixel at this column and row; `None` unless
+    /// The mean true visibility over the samples of the pixel at this column and row; `None` unless
     /// one plane surface whose shadows [count](Self::counts) fills the pixel. `middle` is the sample
     /// at the pixel's middle.
     ///
     /// This is the mean of [`truth`](Self::truth) in a small part of the time. Neighbouring rays
     /// meet the same triangles, so all samples of the pixel share one search for what they see, and
-    /// one for what may lie between them and the light.
+    /// one for what may lie between them and the light. A pixel counts as wholly lit or wholly dark if
+    /// a quarter of its samples, spread evenly, all are. So what covers less than a few samples can
+    /// be missed.
     pub fn truth_of_filled(
         &self,
         [x, y]: [u32; 2],
@@ -58,9 +63,9 @@ impl View<'_> {
         let is_alone = *seen == [own]
             && tracer.is_solid(own)
             && outline.iter().all(|s| s.surface.primitive == own);
-        let samples_into = |samples: &mut Vec<Sample>| {
+        let samples_into = |samples: &mut Vec<Sample>, is_first_look: bool| {
             samples.clear();
-            for i in 0..count {
+            for i in (0..count).filter(|&i| !is_first_look || is_in_first_look(i, grid)) {
                 let ray = self.ray(self.point(x, y, i));
                 let near = tracer.closest_among(seen, ray, range).filter(|_| are_few);
                 let hit = near.or_else(|| tracer.closest(ray, [range[0], f64::INFINITY]))?;
@@ -70,34 +75,37 @@ impl View<'_> {
         };
 
         let positions = outline.map(|s| s.surface.position);
-        let to_light = if is_alone {
-            self.beam_to_light(positions, positions.iter().copied())
-        } else {
-            samples_into(samples)?;
-            self.beam_to_light(positions, samples.iter().map(|s| s.surface.position))
-        };
-        let are_few = tracer.search(&to_light, CASTS, blockers);
-        blockers.retain(|&blocker| !(is_alone && blocker == own));
-        if is_alone && are_few {
+        if is_alone {
+            let to_light = self.beam_to_light(positions, positions.iter().copied());
+            let are_few = tracer.search(&to_light, CASTS, blockers);
+            blockers.retain(|&blocker| blocker != own);
             // What no triangle hides at all is lit everywhere. What a triangle without holes hides
             // at all corners is dark everywhere.
             let hides = |&blocker: &PrimitiveRef| {
                 tracer.is_solid(blocker)
                     && outline.iter().all(|s| self.truth_among(Some(&[blocker]), s) == 0.0)
             };
-            if blockers.is_empty() {
+            if are_few && blockers.is_empty() {
                 return Some(1.0);
             }
-            if blockers.iter().any(hides) {
+            if are_few && blockers.iter().any(hides) {
                 return Some(0.0);
             }
         }
-        if is_alone {
-            samples_into(samples)?;
+        let mut mean = 0.0;
+        for is_first_look in [true, false] {
+            samples_into(samples, is_first_look)?;
+            let points = samples.iter().map(|s| s.surface.position);
+            let to_light = self.beam_to_light(positions, points);
+            let are_few = tracer.search(&to_light, CASTS, blockers);
+            let among = are_few.then_some(&blockers[..]);
+            let sum: f32 = samples.iter().map(|s| self.truth_among(among, s)).sum();
+            mean = sum / samples.len() as f32;
+            if mean == 0.0 || mean == 1.0 {
+                break;
+            }
         }
-        let among = are_few.then_some(&blockers[..]);
-        let truth = |s: &Sample| self.truth_among(among, s);
-        Some(samples.iter().map(truth).sum::<f32>() / count as f32)
+        Some(mean)
     }
 
     /// The beam of rays to the light from points, given with the corners of their outline.
@@ -114,6 +122,14 @@ impl View<'_> {
     }
 }
 
+/// Whether the sample is in the first look at a pixel of `grid` × `grid` samples. The place of the
+/// chosen one changes from square to square, so that thin things along rows and columns are seen.
+fn is_in_first_look(index: u32, grid: u32) -> bool {
+    let [i, j] = [index % grid, index / grid];
+    let square = i / FIRST_LOOK + FIRST_LOOK * (j / FIRST_LOOK);
+    (i % FIRST_LOOK + FIRST_LOOK * (j % FIRST_LOOK)) == square % (FIRST_LOOK * FIRST_LOOK)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,6 +137,7 @@ mod tests {
     use umbrage::{Camera, Light, LookAt, PointLight};
 
     /// The scenes have plane and bent surfaces, cut-outs, lamps, and pixels that many triangles fill.
+    /// Few pixels differ, which are nearly lit, nearly dark or nearly filled.
     #[test]
     fn filled_pixels_have_the_mean_of_their_samples() {
         let sun = Light::Directional { direction: DVec3::new(-0.58, -0.71, -0.41) };
@@ -162,6 +179,7 @@ mod tests {
         let [all, middles] = [many, centers].map(|view| view.band(0..height, &|_| {}));
         let truth = all.map(|s| many.truth(s), &|_| {});
         let mut memory = PixelMemory::default();
+        let (mut missed, mut filled) = (0, 0);
         let pixels = all.samples().chunks(64).zip(truth.chunks(64)).zip(middles.samples());
         for (i, ((samples, truth), middle)) in (0..).zip(pixels) {
             let Some(middle) = middle.filter(|s| many.counts(s.is_facing, s.depth)) else {
@@ -176,10 +194,17 @@ mod tests {
             let expected = is_filled.then(|| truth.iter().sum::<f32>() / 64.0);
             let pixel = [i % width, i / width];
             let mean = many.truth_of_filled(pixel, &middle, &mut memory);
-            assert_eq!(mean, expected, "{name}: {pixel:?}");
+            if mean != expected {
+                missed += 1;
+                let is_near = expected
+                    .is_none_or(|expected| mean.is_some_and(|mean| (mean - expected).abs() <= 0.2));
+                assert!(is_near, "{name}: {pixel:?}: {mean:?}, not {expected:?}");
+            }
             if let Some(mean) = expected {
+                filled += 1;
                 counts[usize::from(mean > 0.0) + usize::from(mean == 1.0)] += 1;
             }
         }
+        assert!(missed * 16 <= filled, "{name}: {missed} of {filled}");
     }
 }
