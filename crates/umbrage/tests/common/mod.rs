@@ -646,7 +646,13 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
             }
             let beam = map.beam(shadow.truncate()).ok_or_else(|| nothing("no beam", shadow))?;
             let off = (p - beam.origin).reject_from_normalized(beam.direction).length();
-            let most = 1e-5 * pixel + 1e-3 * error.worst * pixel + 10.0 * rounding;
+            // A lamp's beam is directed from the lamp to a point at its near distance. The rounding of
+            // that point's coordinates turns the beam.
+            let from_lamp = config.light.position().map_or(0.0, |lamp| {
+                let size = (lamp - config.camera.eye()).abs().max_element();
+                size * 1e-15 * p.distance(lamp) / beam.reach_back
+            });
+            let most = 1e-5 * pixel + 1e-3 * error.worst * pixel + 10.0 * rounding + from_lamp;
             check(off <= most, "beam", &|| format!("misses by {off} of {most}"))?;
         }
     }
