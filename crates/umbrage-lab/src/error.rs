@@ -295,7 +295,7 @@ impl From<umbrage_measure::Error> for Error {
 /// Returns the message of an error, followed by those of its causes.
 pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     let chain = std::iter::successors(Some(error), |e| e.source());
-    joined(chain.map(|e| e.to_string()))
+    joined(chain.map(ToString::to_string))
 }
 
 /// Joins the messages of an error and its causes. Some errors tell their cause themselves, which is

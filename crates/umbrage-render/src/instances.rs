@@ -83,7 +83,7 @@ impl Instances {
         &mut self,
         scene: &SceneBuffers<'_>,
         is_drawn: impl Fn(Aabb) -> bool,
-        left_out: impl Iterator<Item = EdgeOn> + Clone,
+        left_out: &(impl Iterator<Item = EdgeOn> + Clone),
     ) -> DrawList {
         let first_draw = self.draws.len();
         for (i, instance) in scene.instances.iter().enumerate() {

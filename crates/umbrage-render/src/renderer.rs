@@ -213,7 +213,7 @@ impl<'g, 's> Renderer<'g, 's> {
             .map(|redraw| {
                 let light = plan.maps[redraw.index].part.light;
                 let left_out = edge_on.iter().filter(|e| e.light == light).copied();
-                instances.add_casters(scene, |aabb| redraw.may_cast(aabb), left_out)
+                instances.add_casters(scene, |aabb| redraw.may_cast(aabb), &left_out)
             })
             .collect();
         let mut drawn: Vec<(usize, Drawn)> = Vec::with_capacity(lists.len());

@@ -56,8 +56,8 @@ fn the_penumbra_of_an_edge_is_that_of_a_disc() {
     let camera = camera(DVec3::Y, DVec3::ZERO, [4, 4]);
     let sun = Light::Directional { direction: -DVec3::Y };
     let view = View::new(&tracer, camera, sun, 1).unwrap();
-    for degrees in [0.53, 10.0] {
-        let width = 2.0 * (0.5 * f64::from(degrees)).to_radians().tan();
+    for degrees in [0.53f64, 10.0] {
+        let width = 2.0 * (0.5 * degrees).to_radians().tan();
         let (mut errors, mut stated) = (Vec::new(), Vec::new());
         profile(
             &view,

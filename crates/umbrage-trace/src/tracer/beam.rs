@@ -34,6 +34,7 @@ struct Slab {
 }
 
 /// Where the rays of a beam end.
+#[derive(Clone, Copy)]
 pub(crate) enum End {
     /// The beam goes on in this direction, in which all its rays run.
     Endless(DVec3),
@@ -48,7 +49,7 @@ impl Beam {
         let ray = |i: usize| to[i] - from[i];
         let side = |i: usize| (to[(i + 1) % 4] - to[i]).cross(ray(i));
         let along = (0..4).map(ray).sum();
-        Self::new(std::array::from_fn(side), along, from.into_iter().chain(to), f64::NEG_INFINITY)
+        Self::new(std::array::from_fn(side), along, &from.into_iter().chain(to), f64::NEG_INFINITY)
     }
 
     /// A beam of rays that begin at these points. The corners of the points' outline are given in
@@ -62,12 +63,13 @@ impl Beam {
         match end {
             End::Endless(direction) => {
                 let side = |i| edge(i).cross(direction);
-                Self::new(std::array::from_fn(side), direction, points, f64::INFINITY)
+                Self::new(std::array::from_fn(side), direction, &points, f64::INFINITY)
             }
             End::Point(end) => {
                 let side = |i| edge(i).cross(end - outline[i]);
                 let along = end - outline[0];
-                Self::new(std::array::from_fn(side), along, points.chain([end]), f64::NEG_INFINITY)
+                let points = points.chain([end]);
+                Self::new(std::array::from_fn(side), along, &points, f64::NEG_INFINITY)
             }
         }
     }
@@ -76,7 +78,7 @@ impl Beam {
     fn new(
         sides: [DVec3; 4],
         along: DVec3,
-        points: impl Iterator<Item = DVec3> + Clone,
+        points: &(impl Iterator<Item = DVec3> + Clone),
         end: f64,
     ) -> Self {
         let origin = points.clone().next().unwrap_or_default();
