@@ -177,8 +177,13 @@ fn agree(warp: Warp, drawn: Drawn) {
     assert_eq!(native.len(), emulated.len());
     let clamped = native.iter().filter(|d| **d == 0.0).count();
     assert!(clamped > 50, "{warp:?} {drawn:?}: something is clamped: {clamped}");
-    let far = native.iter().zip(&emulated).filter(|(a, b)| (**a - **b).abs() > 2e-6).count();
-    assert!(far * 1000 <= native.len(), "{warp:?} {drawn:?}: {far} of {}", native.len());
+    // Software interpolates in single precision. Hardware rounds the places at which it does.
+    let tolerance = if bench().is_software { 2e-6 } else { 5e-5 };
+    let differences: Vec<f32> = native.iter().zip(&emulated).map(|(a, b)| (a - b).abs()).collect();
+    let far = differences.iter().filter(|d| **d > tolerance).count();
+    let most = differences.iter().fold(0.0, |most: f32, d| most.max(*d));
+    let text = format!("{warp:?} {drawn:?}: {far} of {}, up to {most}", native.len());
+    assert!(far * 1000 <= native.len(), "{text}");
 }
 
 #[needs(gpu)]
