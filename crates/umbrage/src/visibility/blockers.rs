@@ -36,8 +36,8 @@ impl<T: Texels> Blockers<'_, T> {
     /// beam. All such texels lie within the penumbra of a caster at depth 0. Where a lamp hangs
     /// among the casters, however, this penumbra may be as wide as the map, and far wider than what
     /// is to be found. The first step therefore looks along a logarithmic spiral, which has as many
-    /// places near the receiver as far from it on every scale, and finds the widest penumbra. The
-    /// second step looks at places that are evenly spread over that one.
+    /// places near the receiver as far from it on every scale, and finds the widest penumbra. If
+    /// there is one, the second step looks at places that are evenly spread over it.
     pub(super) fn mean_width(&self) -> Option<f64> {
         let Test { map, receiver, .. } = *self.test;
         let farthest = self.diameter * map.penumbra(receiver, receiver.st, 0.0);
@@ -52,6 +52,9 @@ impl<T: Texels> Blockers<'_, T> {
         });
         let widths = places.filter_map(|place| self.width(&first, place));
         let widest = widths.fold(0.0, f64::max).min(farthest);
+        if widest <= 0.0 {
+            return None;
+        }
         let second = self.disc(widest, 1.0, widest / f64::from(self.n));
         let places = Filter::disc_places(count).iter().map(|p| DVec2::from(p.map(f64::from)));
         let widths = places.filter_map(|place| self.width(&second, place));
