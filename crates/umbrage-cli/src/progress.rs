@@ -21,8 +21,8 @@ const BETWEEN_LINES: Duration = Duration::from_secs(5);
 /// Steps of the bar for each part of a job.
 const STEPS: u64 = 1000;
 
-/// How far a job is. All parts of a job take equal lengths of the bar, and each part is divided into
-/// rows of rays. A job may begin with stages that have no rows.
+/// How far a job is. All parts of a job take equal lengths of the bar, and each part is divided
+/// into rows of rays. A job may begin with stages that have no rows.
 pub(crate) struct Bar {
     bar: ProgressBar,
     /// Shows the bar again and again; `None` where it would break log lines.
@@ -35,8 +35,8 @@ pub(crate) struct Bar {
 }
 
 impl Bar {
-    /// Creates the bar of a job that sets its number of parts later. `quiet` hides the bar where log
-    /// lines would break it.
+    /// Creates the bar of a job that sets its number of parts later. `quiet` hides the bar where
+    /// log lines would break it.
     pub(crate) fn of_parts(quiet: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let template = "{prefix}{msg:32} {wide_bar} {percent:>3}% {eta:>4}";

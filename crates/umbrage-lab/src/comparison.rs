@@ -104,8 +104,8 @@ impl<'a> Comparison<'a> {
     ///
     /// # Errors
     /// An error if the scene has no such camera or light, if the view is not one that a camera can
-    /// have, if the number of rays is out of range, if the light cannot have the size in the options,
-    /// or if the planner refuses a technique.
+    /// have, if the number of rays is out of range, if the light cannot have the size in the
+    /// options, or if the planner refuses a technique.
     pub fn new(
         prepared: &'a PreparedScene<'a>,
         view: &ViewOptions,

@@ -63,17 +63,17 @@ impl<'a> Rows<'a> {
         Ok((strip, certainty))
     }
 
-    /// Returns the mean cosine between surface and light of each pixel of `truth`, which must be that
-    /// of these rows, over the samples that count; 0 without any.
+    /// Returns the mean cosine between surface and light of each pixel of `truth`, which must be
+    /// that of these rows, over the samples that count; 0 without any.
     pub(crate) fn cosines(&self, truth: &Strip) -> impl Iterator<Item = f32> {
         let cosine = |s: &Sample| shade::incidence(self.view.light(), &s.surface);
         let cosines = self.band().map(cosine, &|_| {});
         truth.means(move |i| cosines[i]).map(|mean| mean.unwrap_or(0.0))
     }
 
-    /// Returns the mean perspective error of each pixel of `truth`, which must be that of these rows,
-    /// over the samples that count, pixels per texel; NaN if none counts or if no map of the plan
-    /// serves one that counts.
+    /// Returns the mean perspective error of each pixel of `truth`, which must be that of these
+    /// rows, over the samples that count, pixels per texel; NaN if none counts or if no map of the
+    /// plan serves one that counts.
     pub(crate) fn perspective_errors(
         &self,
         truth: &Strip,

@@ -41,8 +41,8 @@ impl NamedTechnique {
         self.text.contains('@')
     }
 
-    /// Returns whether the technique means to show soft shadows as a light with a size throws them. A
-    /// blur of a width in metres does so, too, though its width is the same everywhere.
+    /// Returns whether the technique means to show soft shadows as a light with a size throws them.
+    /// A blur of a width in metres does so, too, though its width is the same everywhere.
     pub fn is_soft(&self) -> bool {
         match self.technique.filter {
             Filter::None | Filter::Hard | Filter::Pcf { .. } => false,

@@ -149,9 +149,9 @@ impl ChosenView {
 }
 
 /// Returns the view that is asked for. Values that are left out come from the scene's camera. If
-/// both the eye and the target are given, only the depth range comes from the scene. A near distance
-/// that neither the user nor the scene's file gives is less than the depth of whatever lies before
-/// the eye.
+/// both the eye and the target are given, only the depth range comes from the scene. A near
+/// distance that neither the user nor the scene's file gives is less than the depth of whatever
+/// lies before the eye.
 ///
 /// # Errors
 /// An error if the scene has no such camera, or if the view is not one that a camera can have.

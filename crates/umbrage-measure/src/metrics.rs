@@ -150,8 +150,8 @@ impl Spots {
         Ok(Self { size, sums })
     }
 
-    /// The centre of the square in which the technique is most wrong, column and row; `None` if it is
-    /// right everywhere.
+    /// The centre of the square in which the technique is most wrong, column and row; `None` if it
+    /// is right everywhere.
     pub fn worst(&self) -> Option<[u32; 2]> {
         self.largest(self.sums.iter().copied())
     }
@@ -324,8 +324,8 @@ mod tests {
     #[test]
     fn edge_on_surfaces_count_as_little_as_they_show() {
         // Half of a sphere's picture is wrong: the outer half of its radius, where the light behind
-        // the viewer meets it at a slant. The mean of the cosine √(1 − r²) over the disc is 2/3, and
-        // beyond r = a it is (1 − a²)^(3/2) of that.
+        // the viewer meets it at a slant. The mean of the cosine √(1 − r²) over the disc is 2/3,
+        // and beyond r = a it is (1 − a²)^(3/2) of that.
         let n = 400;
         let radius = |x: u32, y: u32| {
             let at = |i: u32| (2.0 * f64::from(i) + 1.0) / f64::from(n) - 1.0;

@@ -50,8 +50,8 @@ pub struct Pictures {
     pub partition: Option<String>,
     /// The [`texel_map`](crate::texel_map), if there is one.
     pub texels: Option<String>,
-    /// Where the picture is wrong, by its brightness; `None` for the truth. Visibility would not do,
-    /// because a wrong visibility hardly shows where light grazes a surface.
+    /// Where the picture is wrong, by its brightness; `None` for the truth. Visibility would not
+    /// do, because a wrong visibility hardly shows where light grazes a surface.
     pub spots: Option<Spots>,
 }
 

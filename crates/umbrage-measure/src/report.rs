@@ -93,8 +93,8 @@ pub struct Truth {
     pub rays_per_pixel: u32,
     /// Wall-clock time of tracing all rays, seconds.
     pub seconds: Option<f64>,
-    /// The second truth, of a light with a size; `None` if there is only that of the point light. In
-    /// the JSON, its fields stand beside the others.
+    /// The second truth, of a light with a size; `None` if there is only that of the point light.
+    /// In the JSON, its fields stand beside the others.
     #[serde(default, flatten)]
     pub area: Option<AreaTruth>,
 }

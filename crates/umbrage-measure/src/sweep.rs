@@ -29,8 +29,8 @@ pub struct SweepSettings {
     pub size: [u32; 2],
     /// Number of rays along each side of a pixel.
     pub samples: u32,
-    /// Size of the lights, as in `0.53deg`, for the truth that soft techniques are measured against;
-    /// `None` if all are measured against that of the point light.
+    /// Size of the lights, as in `0.53deg`, for the truth that soft techniques are measured
+    /// against; `None` if all are measured against that of the point light.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light_size: Option<String>,
     /// Whether alpha-masked materials cast and show as solid.

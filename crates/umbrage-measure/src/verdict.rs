@@ -6,8 +6,8 @@ use crate::{Measured, Metrics};
 /// smaller one, or by less than [`UNSEEN`].
 const ALIKE: f64 = 0.05;
 
-/// Smallest difference of a mean visibility that counts: a thousandth, a quarter of the step between
-/// two neighbouring greys of a screen with 8 bits.
+/// Smallest difference of a mean visibility that counts: a thousandth, a quarter of the step
+/// between two neighbouring greys of a screen with 8 bits.
 const UNSEEN: f64 = 0.001;
 
 /// Two costs are a tie if they differ by less than this share of the smaller one. Times of the same
@@ -48,7 +48,8 @@ pub(crate) struct Verdict {
     pub(crate) ties: Vec<usize>,
     /// The technique with the least error, if it differs from that of the best by more than a tie.
     pub(crate) most_exact: Option<usize>,
-    /// The technique with the largest error, if it differs from that of the best by more than a tie.
+    /// The technique with the largest error, if it differs from that of the best by more than a
+    /// tie.
     pub(crate) least_exact: Option<usize>,
 }
 

@@ -32,9 +32,9 @@ pub(crate) struct Draw {
     pub(crate) triangles: Range<u32>,
 }
 
-/// A triangle that is edge-on to a lamp and is left out of the lamp's maps. Seen from the lamp it has
-/// no area, but if it touches the lamp, single precision may put it before the lamp, where it would
-/// hide everything.
+/// A triangle that is edge-on to a lamp and is left out of the lamp's maps. Seen from the lamp it
+/// has no area, but if it touches the lamp, single precision may put it before the lamp, where it
+/// would hide everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EdgeOn {
     /// Index of the light in the plan.
@@ -76,9 +76,9 @@ impl Instances {
         }
     }
 
-    /// Adds all instances that cast and whose box `is_drawn`, with one draw for those of one mesh as
-    /// long as no triangle of theirs is `left_out`. The triangles that are left out of an instance
-    /// ascend.
+    /// Adds all instances that cast and whose box `is_drawn`, with one draw for those of one mesh
+    /// as long as no triangle of theirs is `left_out`. The triangles that are left out of an
+    /// instance ascend.
     pub(crate) fn add_casters(
         &mut self,
         scene: &SceneBuffers<'_>,
@@ -101,9 +101,9 @@ impl Instances {
         first_draw..self.draws.len()
     }
 
-    /// Adds all instances that are seen and whose box `is_drawn`, the nearest to `eye` (world space, metres) first:
-    /// few fragments are then shaded that others hide. The farthest corner of a box counts, so that
-    /// ground and walls follow what stands before them.
+    /// Adds all instances that are seen and whose box `is_drawn`, the nearest to `eye` (world
+    /// space, metres) first: few fragments are then shaded that others hide. The farthest corner of
+    /// a box counts, so that ground and walls follow what stands before them.
     pub(crate) fn add_nearest_first(
         &mut self,
         scene: &SceneBuffers<'_>,

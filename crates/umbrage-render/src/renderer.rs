@@ -186,8 +186,8 @@ impl<'g, 's> Renderer<'g, 's> {
         &self.shadows
     }
 
-    /// Leaves these triangles out of the maps of their lights from now on. Those of one instance must
-    /// ascend.
+    /// Leaves these triangles out of the maps of their lights from now on. Those of one instance
+    /// must ascend.
     pub fn leave_out(&mut self, edge_on: Vec<EdgeOn>) {
         self.edge_on = edge_on;
     }

@@ -52,8 +52,8 @@ impl Tile {
         DVec2::new(left + x, top + y) / f64::from(self.grid)
     }
 
-    /// The line of sight through the upper left corner of the tile, and its change per sample to the
-    /// right and downwards.
+    /// The line of sight through the upper left corner of the tile, and its change per sample to
+    /// the right and downwards.
     fn rays(&self, camera: &Camera) -> [ViewRay; 3] {
         let corner = camera.ray(self.pixel(0.0, 0.0));
         let step = |x, y| {
@@ -101,8 +101,8 @@ impl ViewUniform {
         let forward = camera.forward();
         let [width, height] = tile.size.map(f64::from);
         // A point of depth z is (ray + x ray_x + y ray_y).at(z), which is solved here for x and y.
-        // The steps are perpendicular to each other. Either the lines' directions change from sample
-        // to sample, or their starts.
+        // The steps are perpendicular to each other. Either the lines' directions change from
+        // sample to sample, or their starts.
         let across = |step: ViewRay, n: f64, sign: f64| {
             let step = step.start + step.direction;
             let per_step = step * (2.0 / (n * step.length_squared()));

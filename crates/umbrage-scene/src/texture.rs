@@ -12,7 +12,8 @@ static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
 
 impl Texture {
     /// Linear red, green, blue and straight alpha at texture coordinates `uv`, as
-    /// [`sampling`](Self::sampling) continues them between pixel centres. (0, 0) is the upper left corner of the image, as in glTF.
+    /// [`sampling`](Self::sampling) continues them between pixel centres. (0, 0) is the upper left
+    /// corner of the image, as in glTF.
     ///
     /// Coordinates that are not finite count as 0. A texture without pixels is opaque white.
     pub fn sample(&self, uv: Vec2) -> Vec4 {
@@ -60,8 +61,8 @@ fn neighbours(coordinate: f32, size: u32, wrap: Wrap) -> (usize, usize, f32) {
     (index(first), index(first + 1.0), x - first)
 }
 
-/// A texture coordinate in pixels. It is reduced to one period first, so that large coordinates keep
-/// their precision.
+/// A texture coordinate in pixels. It is reduced to one period first, so that large coordinates
+/// keep their precision.
 fn pixels(coordinate: f32, size: u32, wrap: Wrap) -> f32 {
     let c = if coordinate.is_finite() { coordinate } else { 0.0 };
     let c = match wrap {

@@ -230,8 +230,8 @@ impl Scene {
     }
 
     /// The box around everything that is seen, apart from a [sky](Self::sky), world space, metres,
-    /// exact to rounding; [`Aabb::EMPTY`] without triangles. Takes a pass over the vertices of every
-    /// instance that is rotated and may extend beyond the instances before it.
+    /// exact to rounding; [`Aabb::EMPTY`] without triangles. Takes a pass over the vertices of
+    /// every instance that is rotated and may extend beyond the instances before it.
     pub fn bounds(&self) -> Aabb {
         self.bounds_of(Role::is_receiver)
     }

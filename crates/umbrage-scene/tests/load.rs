@@ -544,8 +544,8 @@ fn pipe(path: &Path) {
     assert!(made.success(), "{}: {made}", path.display());
 }
 
-/// Nothing waits for a pipe's writer or reads a device without end: neither the scene itself, nor an
-/// image, nor the list of a scene's files.
+/// Nothing waits for a pipe's writer or reads a device without end: neither the scene itself, nor
+/// an image, nor the list of a scene's files.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_at_once() {

@@ -31,8 +31,8 @@ fn peak<T>(f: impl FnOnce() -> T) -> (u64, T) {
     ((ALLOCATOR.peak_usage() - before) as u64, result)
 }
 
-/// The error of a file that takes too much, after a check that it took hardly more than `limit` bytes
-/// to find out.
+/// The error of a file that takes too much, after a check that it took hardly more than `limit`
+/// bytes to find out.
 fn too_large(file: File, limit: u64) -> String {
     let folder = TempDir::new().unwrap();
     let path = file.write(folder.path());

@@ -1,5 +1,5 @@
-//! Time to plan the maps of one light, by the boxes around receivers and by technique. The boxes are
-//! those around the surfaces of third-party scenes, and boxes scattered at random.
+//! Time to plan the maps of one light, by the boxes around receivers and by technique. The boxes
+//! are those around the surfaces of third-party scenes, and boxes scattered at random.
 //!
 //! ```sh
 //! cargo bench -p umbrage-trace --bench planning           # all

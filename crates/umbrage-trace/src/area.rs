@@ -24,15 +24,15 @@ const MOST_GRIDS: u32 = 24;
 /// The light of a view with a size: a sun is a disc in the sky, and a lamp is a sphere around its
 /// position.
 ///
-/// [`visibility`](Self::visibility) is found by many rays. A first look at the rim and at some points
-/// within decides whether the light is wholly visible or wholly hidden, in which case no further
-/// rays are cast. What hides less than about a twentieth of the light can escape the first look if it
-/// is thin, such as a wire.
+/// [`visibility`](Self::visibility) is found by many rays. A first look at the rim and at some
+/// points within decides whether the light is wholly visible or wholly hidden, in which case no
+/// further rays are cast. What hides less than about a twentieth of the light can escape the first
+/// look if it is thin, such as a wire.
 ///
 /// Otherwise two points are chosen at random in each cell of a grid over the light, and the
 /// differences between the two tell the standard error. Further grids follow until that of their
-/// mean is at most [`STANDARD_ERROR`](Self::STANDARD_ERROR). The same point of a surface always gets
-/// the same rays, and different points get different ones.
+/// mean is at most [`STANDARD_ERROR`](Self::STANDARD_ERROR). The same point of a surface always
+/// gets the same rays, and different points get different ones.
 pub struct AreaLight<'v, 'a> {
     view: &'v View<'a>,
     /// A lamp's radius in metres; the tangent of half the angle that a sun subtends.
@@ -73,8 +73,8 @@ impl<'v, 'a> AreaLight<'v, 'a> {
         Ok(Self { view, radius: 0.5 * f64::from(size.diameter()) })
     }
 
-    /// The share of the light that reaches a sample. It is 0 if the middle of the light is behind the
-    /// surface or out of reach ([`Sample::is_facing`]), and 1 nearer to a lamp than its `near`
+    /// The share of the light that reaches a sample. It is 0 if the middle of the light is behind
+    /// the surface or out of reach ([`Sample::is_facing`]), and 1 nearer to a lamp than its `near`
     /// distance, as it is for a light without a size ([`View::truth`]).
     pub fn visibility(&self, sample: &Sample) -> AreaVisibility {
         let surface = &sample.surface;

@@ -4,7 +4,8 @@ use crate::tracer::{Beam, CASTS, End, IS_SEEN};
 use crate::{PrimitiveRef, Sample, View};
 use glam::DVec3;
 
-/// Surfaces count as one plane if the cosine of the angle between their normals is above this value.
+/// Surfaces count as one plane if the cosine of the angle between their normals is above this
+/// value.
 const SAME_PLANE: f64 = 0.99;
 
 /// One sample of each square of this many by this many is in the first look at a pixel.
@@ -20,14 +21,14 @@ pub struct PixelMemory {
 
 impl View<'_> {
     /// The mean true visibility over the samples of the pixel at this column and row; `None` unless
-    /// one plane surface whose shadows [count](Self::counts) fills the pixel. `middle` is the sample
-    /// at the pixel's middle.
+    /// one plane surface whose shadows [count](Self::counts) fills the pixel. `middle` is the
+    /// sample at the pixel's middle.
     ///
     /// This is the mean of [`truth`](Self::truth) in a small part of the time. Neighbouring rays
     /// meet the same triangles, so all samples of the pixel share one search for what they see, and
-    /// one for what may lie between them and the light. A pixel counts as wholly lit or wholly dark if
-    /// a quarter of its samples, spread evenly, all are. So what covers less than a few samples can
-    /// be missed.
+    /// one for what may lie between them and the light. A pixel counts as wholly lit or wholly dark
+    /// if a quarter of its samples, spread evenly, all are. So what covers less than a few samples
+    /// can be missed.
     pub fn truth_of_filled(
         &self,
         [x, y]: [u32; 2],
@@ -58,8 +59,8 @@ impl View<'_> {
             seen.clear();
         }
         let own = outline[0].surface.primitive;
-        // If a triangle without holes is alone in the beam, and all corners show it, so does all that
-        // lies between them.
+        // If a triangle without holes is alone in the beam, and all corners show it, so does all
+        // that lies between them.
         let is_alone = *seen == [own]
             && tracer.is_solid(own)
             && outline.iter().all(|s| s.surface.primitive == own);
@@ -136,8 +137,8 @@ mod tests {
     use crate::Tracer;
     use umbrage::{Camera, Light, LookAt, PointLight};
 
-    /// The scenes have plane and bent surfaces, cut-outs, lamps, and pixels that many triangles fill.
-    /// Few pixels differ, which are nearly lit, nearly dark or nearly filled.
+    /// The scenes have plane and bent surfaces, cut-outs, lamps, and pixels that many triangles
+    /// fill. Few pixels differ, which are nearly lit, nearly dark or nearly filled.
     #[test]
     fn filled_pixels_have_the_mean_of_their_samples() {
         let sun = Light::Directional { direction: DVec3::new(-0.58, -0.71, -0.41) };

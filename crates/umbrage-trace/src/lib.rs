@@ -83,8 +83,8 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// The line of sight through a point of the picture, given in pixels as for [`Camera::ray`]. The
-    /// parameter t is the depth.
+    /// The line of sight through a point of the picture, given in pixels as for [`Camera::ray`].
+    /// The parameter t is the depth.
     pub fn of_view(camera: &Camera, pixel: DVec2) -> Self {
         let sight = camera.ray(pixel);
         Self { origin: camera.eye() + sight.start, direction: sight.direction }

@@ -58,8 +58,8 @@ impl Placement {
     }
 
     /// Upper bound of the error of `position`, computed in double precision on the triangle with
-    /// these corners, metres. Interpolation, transform and back are some ten roundings of the mesh's
-    /// and the world's coordinates.
+    /// these corners, metres. Interpolation, transform and back are some ten roundings of the
+    /// mesh's and the world's coordinates.
     pub(crate) fn position_error(&self, corners: [DVec3; 3], position: DVec3) -> f64 {
         let largest = corners.iter().fold(DVec3::ZERO, |m, c| m.max(c.abs())).max_element();
         let world =

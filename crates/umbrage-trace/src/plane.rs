@@ -3,16 +3,17 @@
 use crate::placement::Placement;
 use glam::DVec3;
 
-/// Bound of what single precision took from a coordinate, relative to the coordinate. Rounding takes
-/// up to 2⁻²⁴. It counts twice, because a point may lie beside the triangle whose plane is meant.
+/// Bound of what single precision took from a coordinate, relative to the coordinate. Rounding
+/// takes up to 2⁻²⁴. It counts twice, because a point may lie beside the triangle whose plane is
+/// meant.
 const STORED: f64 = 1.0 / (1 << 23) as f64;
 
 /// Bound of what some ten steps in double precision take, relative to the coordinates.
 pub(crate) const COMPUTED: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// The largest part of its own length by which a triangle is taken to have been moved when its
-/// corners were stored. Rounding that moved corners farther would have left no plane to speak of. So
-/// far from the origin it is likelier that the coordinates needed no rounding.
+/// corners were stored. Rounding that moved corners farther would have left no plane to speak of.
+/// So far from the origin it is likelier that the coordinates needed no rounding.
 const LARGEST_SHIFT: f64 = 1.0 / 1024.0;
 
 /// The plane of a triangle of an instance.
@@ -42,9 +43,9 @@ impl<'a> TrianglePlane<'a> {
     /// Whether a point of another triangle may lie in this plane. `position_error` is the computed
     /// error of the point, metres.
     ///
-    /// The stored error counts only if the two triangles may have been coplanar before their corners
-    /// were rounded. A wall and the floor that it stands on are not, so rounding makes no difference
-    /// to which of them hides the other.
+    /// The stored error counts only if the two triangles may have been coplanar before their
+    /// corners were rounded. A wall and the floor that it stands on are not, so rounding makes no
+    /// difference to which of them hides the other.
     pub(crate) fn holds_point_of(
         &self,
         other: &TrianglePlane<'_>,

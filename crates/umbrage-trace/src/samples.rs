@@ -35,8 +35,8 @@ pub struct Sample {
     /// Whether the visible side of the triangle faces the light and lies within the light's reach
     /// (a spot or point light's range, a spot light's cone). If not, the sample is dark whatever
     /// any shadow map says. The geometric normal decides, because triangles are what casts and
-    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp faces it, as if the lamp
-    /// were a little on the visible side.
+    /// receives shadows. A triangle [edge-on](Tracer::is_edge_on) to a lamp faces it, as if the
+    /// lamp were a little on the visible side.
     pub is_facing: bool,
 }
 
@@ -183,7 +183,8 @@ impl<'a> View<'a> {
         self.truth_among(None, sample)
     }
 
-    /// [`truth`](Self::truth), if nothing but some triangles can be between the sample and the light.
+    /// [`truth`](Self::truth), if nothing but some triangles can be between the sample and the
+    /// light.
     pub(crate) fn truth_among(&self, among: Option<&[PrimitiveRef]>, sample: &Sample) -> f32 {
         if !sample.is_facing {
             return 0.0;

@@ -131,8 +131,8 @@ pub fn normal_color(normal: DVec3) -> [u8; 3] {
 }
 
 /// Depth (metres) as grey, from white at the camera's near distance to black at its far distance,
-/// on a logarithmic scale: equal ratios of depth are equal steps of grey. In orthographic views equal
-/// differences are.
+/// on a logarithmic scale: equal ratios of depth are equal steps of grey. In orthographic views
+/// equal differences are.
 pub fn depth_color(camera: &Camera, depth: f64) -> [u8; 3] {
     let (near, far) = (camera.near(), camera.far());
     let relative = match camera.is_orthographic() {

@@ -110,9 +110,9 @@ impl Eq for Opened {}
 /// neighbours (`ShearedRay`). The boxes are in single precision and are padded for all rounding
 /// (`Boxes`). No hit is ever lost, as long as rays start within some 10⁷ scene sizes of the scene.
 ///
-/// All triangles are visible and cast shadows from both sides, unless the scene gives their instance
-/// another [role](Scene::roles). Where an alpha mask removes a surface, rays pass. Triangles without
-/// area are ignored.
+/// All triangles are visible and cast shadows from both sides, unless the scene gives their
+/// instance another [role](Scene::roles). Where an alpha mask removes a surface, rays pass.
+/// Triangles without area are ignored.
 pub struct Tracer<'a> {
     scene: &'a Scene,
     /// One for each mesh.
@@ -131,8 +131,8 @@ struct MeshBoxes<'a> {
     mask: Option<Mask<'a>>,
 }
 
-/// An alpha mask: where `factor` times the alpha of the texture and of the vertices is below `cutoff`,
-/// there is no surface.
+/// An alpha mask: where `factor` times the alpha of the texture and of the vertices is below
+/// `cutoff`, there is no surface.
 struct Mask<'a> {
     cutoff: f32,
     factor: f32,
@@ -222,8 +222,9 @@ impl<'a> Tracer<'a> {
         self.scene
     }
 
-    /// A box around everything that is seen, apart from a sky, world space, metres;
-    /// [`Aabb::EMPTY`] if there are no triangles. The box is loose around rotated instances; [`Scene::bounds`] gives the exact box.
+    /// A box around everything that is seen, apart from a sky, world space, metres; [`Aabb::EMPTY`]
+    /// if there are no triangles. The box is loose around rotated instances; [`Scene::bounds`]
+    /// gives the exact box.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
@@ -335,14 +336,14 @@ impl<'a> Tracer<'a> {
         self.any(None, ray, range, Ends::default(), CASTS)
     }
 
-    /// Whether anything that casts shadows lies in `direction` from a point on a surface, nearer than
-    /// `end` lengths of `direction`.
+    /// Whether anything that casts shadows lies in `direction` from a point on a surface, nearer
+    /// than `end` lengths of `direction`.
     ///
     /// The surface does not hide itself, although no epsilon is used: the search skips the point's
     /// own triangle, and every other triangle whose plane the point lies in as far as double
     /// precision can tell. Such triangles are neighbours at their shared edge and copies of the
-    /// triangle. It also skips triangles that may have been coplanar with the point's own before the
-    /// corners of both were rounded to single precision, such as decals.
+    /// triangle. It also skips triangles that may have been coplanar with the point's own before
+    /// the corners of both were rounded to single precision, such as decals.
     pub fn occluded_from(&self, surface: &Surface, direction: DVec3, end: f64) -> bool {
         self.occluded_among(None, surface, direction, end)
     }
@@ -507,8 +508,8 @@ impl<'a> Tracer<'a> {
         found
     }
 
-    /// Whether a ray that started on a surface started on this very triangle, or in its plane as far
-    /// as rounding can tell.
+    /// Whether a ray that started on a surface started on this very triangle, or in its plane as
+    /// far as rounding can tell.
     fn is_left_behind(&self, from: &Surface, primitive: PrimitiveRef) -> bool {
         let Surface { position, position_error, .. } = *from;
         let is_in_plane = || {
@@ -530,8 +531,8 @@ impl<'a> Tracer<'a> {
         mask.factor * alpha * vertex_alpha(mesh, primitive, hit.weights) >= mask.cutoff
     }
 
-    /// Calls `visit` with every triangle of the wanted instances that the ray meets, and with some beyond the range.
-    /// `visit` returns the new end of the range, or `None` to stop the search.
+    /// Calls `visit` with every triangle of the wanted instances that the ray meets, and with some
+    /// beyond the range. `visit` returns the new end of the range, or `None` to stop the search.
     fn visit(
         &self,
         ray: Ray,

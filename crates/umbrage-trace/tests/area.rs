@@ -8,7 +8,8 @@ use umbrage::visibility::LightSize;
 use umbrage::{Light, PointLight};
 use umbrage_trace::{AreaLight, AreaVisibility, Error, Sample, Tracer, View};
 
-/// The share of a disc of radius 1 on the far side of a line at this signed distance from its middle.
+/// The share of a disc of radius 1 on the far side of a line at this signed distance from its
+/// middle.
 fn beyond(distance: f64) -> f64 {
     let d = distance.clamp(-1.0, 1.0);
     (d.acos() - d * (1.0 - d * d).sqrt()) / std::f64::consts::PI

@@ -57,9 +57,9 @@ fn differing(a: &[Option<f32>], b: &[Option<f32>]) -> f64 {
 
 #[test]
 fn a_plane_through_a_lamp_hides_nothing() {
-    // The lamp's place, the way to move it by 1 mm, and a sheet whose plane holds the lamp: a ceiling
-    // with the lamp amid a triangle, at a corner and on an edge; a sheet through the bulb; and the
-    // ground itself.
+    // The lamp's place, the way to move it by 1 mm, and a sheet whose plane holds the lamp: a
+    // ceiling with the lamp amid a triangle, at a corner and on an edge; a sheet through the bulb;
+    // and the ground itself.
     let ceiling = || sheet(Vec3::new(-4.0, 2.5, -4.0), Vec3::X * 8.0, Vec3::Z * 8.0);
     let hung = || sheet(Vec3::new(0.25, 2.0, -0.5), Vec3::Y, Vec3::Z);
     let cases = [

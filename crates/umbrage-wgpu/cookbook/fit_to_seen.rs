@@ -28,10 +28,10 @@ impl SeenShadows {
         Ok(Self { technique, planner, readback, shadows })
     }
 
-    /// Before the picture: plans the maps and encodes the passes that draw them. `receivers` hold all
-    /// models, because the camera may come to see what it did not see before. `moving` holds the
-    /// models that move, at the places that they have had in the last few frames. Nothing
-    /// comes nearer to this camera than 10 cm.
+    /// Before the picture: plans the maps and encodes the passes that draw them. `receivers` hold
+    /// all models, because the camera may come to see what it did not see before. `moving` holds
+    /// the models that move, at the places that they have had in the last few frames. Nothing comes
+    /// nearer to this camera than 10 cm.
     pub fn draw(
         &mut self,
         (device, queue): (&wgpu::Device, &wgpu::Queue),

@@ -83,8 +83,8 @@ impl MeshCasters {
     /// Creates the pipeline for vertex buffers with these layouts. `buffers` must have the position
     /// (`Float32x3`) at shader location 0, the instance's rows at locations 1 to 3 (see
     /// [`CasterInstance::LAYOUT`]) and, for masked meshes, texture coordinates (`Float32x2`) at
-    /// location 4. Where masked vertices have an alpha of their own, it is the fourth component of a
-    /// `Float32x4` there; the third is not read.
+    /// location 4. Where masked vertices have an alpha of their own, it is the fourth component of
+    /// a `Float32x4` there; the third is not read.
     pub fn new(
         device: &Device,
         shadows: &Shadows,

@@ -28,9 +28,10 @@
 //! # Bias
 //!
 //! There is none to tune. The map's matrix and the receiver's plane alone give the depth that this
-//! plane has at each texel, and what a texel cannot tell (see [`umbrage::visibility`]). The lookup needs the normal of the *triangle*: interpolated normals
-//! bend away from the triangle's plane, and the surface then shadows itself. [`Bias`] adds a margin
-//! where the geometry that casts is coarser than the geometry that receives.
+//! plane has at each texel, and what a texel cannot tell (see [`umbrage::visibility`]). The lookup
+//! needs the normal of the *triangle*: interpolated normals bend away from the triangle's plane,
+//! and the surface then shadows itself. [`Bias`] adds a margin where the geometry that casts is
+//! coarser than the geometry that receives.
 //!
 //! # What a frame costs
 //!

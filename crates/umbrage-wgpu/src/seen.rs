@@ -54,8 +54,8 @@ impl DepthProjection {
         Ok(Self { base, per_nearness, is_orthographic: false })
     }
 
-    /// The depths of a perspective projection between these distances, metres. `far` may be infinite. Reversed depths are 1 at
-    /// the near distance.
+    /// The depths of a perspective projection between these distances, metres. `far` may be
+    /// infinite. Reversed depths are 1 at the near distance.
     ///
     /// # Errors
     /// [`Error::Invalid`] unless 0 < `near` < `far`.
@@ -254,8 +254,8 @@ impl SeenReadback {
     }
 
     /// Encodes the reduction of a depth buffer that holds a finished picture of `camera`, and the
-    /// way back of its tiles once the commands are submitted. While the tiles of three frames are on
-    /// their way, nothing is encoded.
+    /// way back of its tiles once the commands are submitted. While the tiles of three frames are
+    /// on their way, nothing is encoded.
     ///
     /// `depth` is a view of the depth aspect alone, whose texture has the usage `TEXTURE_BINDING`.
     /// The picture lies at the upper left of the texture, with the size of [`Camera::image`].

@@ -66,8 +66,8 @@ impl LookupBuffers {
             Faces::Sides => [4, 3],
             Faces::SidesAndNear => [5, 4],
         };
-        // A pyramid of light has up to six planes, and the cone of a wide spot light has four. A slice
-        // has two ends, and the view has one.
+        // A pyramid of light has up to six planes, and the cone of a wide spot light has four. A
+        // slice has two ends, and the view has one.
         let planes = 6 + 4 + 2 + 1 + face_planes;
         let of_light = CUBE_SIDES * faces * technique.partition.slices as usize;
         let maps = lights.saturating_mul(of_light);

@@ -19,8 +19,8 @@ pub struct Camera {
     /// the slopes of the side planes.
     slope_min: DVec2,
     slope_max: DVec2,
-    /// The scale at depth 0, metres, and its growth per metre of depth: (0, 1) in perspective views,
-    /// where it is the depth, and (the picture's height, 0) in orthographic views.
+    /// The scale at depth 0, metres, and its growth per metre of depth: (0, 1) in perspective
+    /// views, where it is the depth, and (the picture's height, 0) in orthographic views.
     scale: [f64; 2],
     near: f64,
     far: f64,
@@ -144,9 +144,9 @@ impl Camera {
     /// from −1 to 1, also reversed, an infinite far plane, and an off-centre frustum.
     ///
     /// `world_from_view` is the camera's rigid pose, `clip_from_view` its perspective or
-    /// orthographic projection. An orthographic projection does not tell where the viewer looks. The
-    /// pose tells it: one that mirrors belongs to a left-handed view space, which looks along +z.
-    /// `shadow_distance` (metres along the view) replaces the far plane's distance if it is
+    /// orthographic projection. An orthographic projection does not tell where the viewer looks.
+    /// The pose tells it: one that mirrors belongs to a left-handed view space, which looks along
+    /// +z. `shadow_distance` (metres along the view) replaces the far plane's distance if it is
     /// smaller; it is required if the far plane is infinite. `image` is the size in pixels.
     ///
     /// # Errors
@@ -274,8 +274,8 @@ impl Camera {
         self.scale[1] == 0.0
     }
 
-    /// The scale of the picture at a depth, metres: a length across the view that is as large as the
-    /// scale takes as many pixels at every depth. In perspective views it is the depth itself.
+    /// The scale of the picture at a depth, metres: a length across the view that is as large as
+    /// the scale takes as many pixels at every depth. In perspective views it is the depth itself.
     pub(crate) fn scale_at(&self, depth: f64) -> f64 {
         self.scale[0] + self.scale[1] * depth
     }
@@ -423,8 +423,8 @@ impl Projection {
             true => -1.0,
             false => w.z.signum(),
         };
-        // Beside its factor each coordinate has one more entry, for pictures whose middle lies aside:
-        // a slope in perspective views, a distance in orthographic ones.
+        // Beside its factor each coordinate has one more entry, for pictures whose middle lies
+        // aside: a slope in perspective views, a distance in orthographic ones.
         let (scale, others) = match is_orthographic {
             true => (constant, [x.z, y.z, w.z]),
             false => (growth, [x.w, y.w, w.w]),

@@ -14,8 +14,8 @@ const ASKEW: f64 = 1e-6;
 
 /// Appends planes around all that can cast onto `body`, which is the body swept towards the light:
 /// those planes of `around` that touch the body and whose inside lies towards the light, and one
-/// plane through every edge of the body's outline as the light sees it. `bounds` is the body's bounding
-/// box, and `outline` holds the indices of the outline's vertices.
+/// plane through every edge of the body's outline as the light sees it. `bounds` is the body's
+/// bounding box, and `outline` holds the indices of the outline's vertices.
 pub(crate) fn caster_planes(
     planes: &mut Vec<Plane>,
     around: impl Iterator<Item = Plane>,

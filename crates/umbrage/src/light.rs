@@ -32,8 +32,8 @@ pub struct PointLight {
     pub range: f64,
 }
 
-/// A cone of light from one point. A [wide](Self::is_wide) one is a part of a [`PointLight`]: it has
-/// the six maps of one, and its distances count as those of one.
+/// A cone of light from one point. A [wide](Self::is_wide) one is a part of a [`PointLight`]: it
+/// has the six maps of one, and its distances count as those of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
     /// Position in world space, metres.
@@ -46,8 +46,8 @@ pub struct SpotLight {
     /// nearer than this get no shadow; casters nearer than this cast shadows onto receivers beyond.
     /// For a wide light it is the distance along the nearest world axis.
     pub near: f64,
-    /// Distance along the axis at which the light ends, metres, > `near`. For a wide light it is the
-    /// distance from the light.
+    /// Distance along the axis at which the light ends, metres, > `near`. For a wide light it is
+    /// the distance from the light.
     pub range: f64,
 }
 

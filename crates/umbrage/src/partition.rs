@@ -11,10 +11,10 @@ use glam::{DVec3, DVec4};
 /// The ends of slices; entries after the last slice's end are not used.
 pub(crate) type Ends = [f64; Partition::MAX_SLICES + 1];
 
-/// The faces of a perspective view's frustum as seen from a light, in local space. A partition uses those faces that
-/// together cover what the light sees of the frustum exactly once: its front faces if the light
-/// comes from behind the viewer, otherwise its back faces (W&P §5.1). The near face is among them
-/// in both cases.
+/// The faces of a perspective view's frustum as seen from a light, in local space. A partition uses
+/// those faces that together cover what the light sees of the frustum exactly once: its front faces
+/// if the light comes from behind the viewer, otherwise its back faces (W&P §5.1). The near face is
+/// among them in both cases.
 ///
 /// A face serves a wedge around the line from the eye to the light, between the two planes through
 /// that line and the face's side edges. Wedges extend to infinity, so that rounding at the
@@ -246,8 +246,8 @@ impl Scale {
 /// them alike.
 const NEARLY_ALIKE: f64 = 1.03;
 
-/// The share of the best ratio so far that a useful round attains at most. The search ends after three
-/// rounds that are of no use.
+/// The share of the best ratio so far that a useful round attains at most. The search ends after
+/// three rounds that are of no use.
 const USEFUL: f64 = 0.97;
 
 /// The largest number of times that all slices are tried.
@@ -258,10 +258,10 @@ const MOST_ENDS: usize = Partition::MAX_SLICES - 1;
 
 /// Moves all but the first and the last end so that all slices need similar storage.
 ///
-/// The unknowns are the positions of the ends on the scale, and what shall vanish are the differences between
-/// the logarithms of neighbouring storages. They are found by Broyden's method (1965). Storage can
-/// jump where a slice reaches a receiver, and then no ends may be right; of all ends tried, those
-/// whose storages differ least are taken.
+/// The unknowns are the positions of the ends on the scale, and what shall vanish are the
+/// differences between the logarithms of neighbouring storages. They are found by Broyden's method
+/// (1965). Storage can jump where a slice reaches a receiver, and then no ends may be right; of all
+/// ends tried, those whose storages differ least are taken.
 fn equalize(ends: &mut [f64], scale: Scale, mut storage: impl FnMut(f64, f64) -> f64) {
     let k = ends.len() - 1;
     let [n, f] = [ends[0], ends[k]];

@@ -90,7 +90,8 @@ pub enum Face {
     Near,
 }
 
-/// A side of the cube around a point light or a wide spot light, named by the world axis that points through it.
+/// A side of the cube around a point light or a wide spot light, named by the world axis that
+/// points through it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "they say it all")]
 pub enum CubeSide {

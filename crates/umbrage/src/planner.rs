@@ -191,8 +191,8 @@ impl Planner {
         Ok(())
     }
 
-    /// Forgets the last plan, so that the next one keeps nothing of it. The plan is the same; this is
-    /// for measuring what a plan costs when everything has changed.
+    /// Forgets the last plan, so that the next one keeps nothing of it. The plan is the same; this
+    /// is for measuring what a plan costs when everything has changed.
     pub fn forget(&mut self) {
         self.last.view = None;
     }
@@ -359,8 +359,8 @@ impl Planner {
             lit.set_clipped(view, pyramid);
         }
         let with_near = technique.partition.faces == Faces::SidesAndNear;
-        // All pixels of an orthographic view have the same width, so its faces need no maps of their
-        // own. The first one serves the whole view.
+        // All pixels of an orthographic view have the same width, so its faces need no maps of
+        // their own. The first one serves the whole view.
         let faces = (!camera.is_orthographic())
             .then(|| partition::LitFaces::new(camera, projector, with_near));
         let faces_with_maps = match technique.filter.has_maps() {

@@ -3,8 +3,8 @@
 //! Lauritzen, Salvi and Lefohn 2010 ("Sample distribution shadow maps") fit maps to the bounds of
 //! the samples in the depth buffer. Here the samples of each tile of the picture lie between two
 //! parallel planes of nearness: of inverse depth, or in orthographic views of depth with a minus
-//! sign. A plane in space is also a plane over the picture when its nearness is plotted, so a floor, a
-//! wall or a roof takes no more room than it has.
+//! sign. A plane in space is also a plane over the picture when its nearness is plotted, so a
+//! floor, a wall or a roof takes no more room than it has.
 
 use crate::bounds::Aabb;
 use crate::camera::Camera;
@@ -33,9 +33,9 @@ pub struct SeenTile {
     /// Least and greatest nearness in the middle, 1/m.
     pub nearness: [f64; 2],
     /// The largest change of slope from pixel to pixel, along rows and columns: |w₋ − 2w + w₊|,
-    /// where w is the nearness, in the sky that of what is infinitely far; 1/m. Within a plane it is
-    /// 0, and at a silhouette it is the jump in nearness, which tells how much may appear there when the
-    /// camera moves.
+    /// where w is the nearness, in the sky that of what is infinitely far; 1/m. Within a plane it
+    /// is 0, and at a silhouette it is the jump in nearness, which tells how much may appear there
+    /// when the camera moves.
     pub jump: f64,
 }
 
@@ -58,9 +58,9 @@ pub struct SeenTile {
 /// [`LEAST_GAP`](Self::LEAST_GAP) pixels are not counted.
 ///
 /// Where the camera has moved along the view direction by more than half the distance of the
-/// nearest surface seen, the boxes alone serve the frame. So they do where an orthographic camera has
-/// turned, or its near plane has come to what it saw. In any other motion it uncovers nothing but at
-/// the edges of the picture.
+/// nearest surface seen, the boxes alone serve the frame. So they do where an orthographic camera
+/// has turned, or its near plane has come to what it saw. In any other motion it uncovers nothing
+/// but at the edges of the picture.
 ///
 /// # What it costs
 /// Nothing where the camera stands still. In motion, tiles with silhouettes reach back to the
@@ -198,8 +198,8 @@ fn beyond(camera: &Camera, times: f64) -> f64 {
     }
 }
 
-/// The nearness of a depth, which in all planes is a linear function over the picture: 1/depth, or in
-/// orthographic views −depth, and then not infinite.
+/// The nearness of a depth, which in all planes is a linear function over the picture: 1/depth, or
+/// in orthographic views −depth, and then not infinite.
 fn nearness(camera: &Camera, depth: f64) -> f64 {
     if camera.is_orthographic() { -depth.clamp(-FARTHEST, FARTHEST) } else { depth.recip() }
 }

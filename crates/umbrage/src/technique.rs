@@ -112,11 +112,11 @@ impl Cover {
 /// differ only in λ, the distance from the centre of projection to the warp's near plane. All but
 /// `Lambda` turn smoothly into `Uniform` as the view direction approaches the light direction.
 ///
-/// In orthographic views a pixel has the same width at every depth. `Psm`, `Lispsm`, `Tsm` and `Log`,
-/// which undo the viewer's perspective, are then `Uniform`; the λ of their rules tends to infinity as
-/// a perspective view recedes. So is `Adaptive` under parallel light, where texels of every even map
-/// are as good as each other. Under a lamp texels grow with the distance from the lamp, and it may
-/// still warp. `Lambda` does what it says.
+/// In orthographic views a pixel has the same width at every depth. `Psm`, `Lispsm`, `Tsm` and
+/// `Log`, which undo the viewer's perspective, are then `Uniform`; the λ of their rules tends to
+/// infinity as a perspective view recedes. So is `Adaptive` under parallel light, where texels of
+/// every even map are as good as each other. Under a lamp texels grow with the distance from the
+/// lamp, and it may still warp. `Lambda` does what it says.
 ///
 /// Where the view runs exactly along the light, the view direction does not define a z axis. While
 /// the view sweeps past the light direction, every map therefore makes half a turn, `Uniform`
@@ -215,8 +215,9 @@ impl Default for Partition {
 }
 
 /// Where slices along the view meet. n and f are the view distances of the nearest and the farthest
-/// receiver seen; for [`Cover::Stable`] they are the camera's near and far distance. In orthographic
-/// views slices of equal length have equal errors, so `SelfSimilar` and `Practical` make these.
+/// receiver seen; for [`Cover::Stable`] they are the camera's near and far distance. In
+/// orthographic views slices of equal length have equal errors, so `SelfSimilar` and `Practical`
+/// make these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Splits {

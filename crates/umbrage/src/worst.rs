@@ -1,9 +1,9 @@
 //! The largest errors of a map over a body, to a known tolerance.
 //!
 //! Let A be the footprint (metres per texel), w the projection's fourth coordinate and z the scale
-//! of the view, which is its depth, or constant in orthographic views. Then A = w·B. Under parallel light B is affine in the point; under a spot light B = (r
-//! × K)/|r|, where r is the vector from the light to the point and r × K is affine. On a simplex,
-//! therefore,
+//! of the view, which is its depth, or constant in orthographic views. Then A = w·B. Under parallel
+//! light B is affine in the point; under a spot light B = (r × K)/|r|, where r is the vector from
+//! the light to the point and r × K is affine. On a simplex, therefore,
 //!
 //! - w/z, and under spot lights w/(r·m) with a fixed unit vector m, are ratios of linear functions
 //!   and largest at corners;
@@ -29,9 +29,9 @@ use std::ops::Range;
 
 /// The share by which the reported maximum may exceed the true one.
 const TOLERANCE: f64 = 0.01;
-/// Number of halvings after which the remaining bounds are reported as they are, if they are finite.
-/// Parallel light needs dozens. Half of all maps under lamps reach this number, and ten times as many
-/// halvings would lower the bounds by some per cent.
+/// Number of halvings after which the remaining bounds are reported as they are, if they are
+/// finite. Parallel light needs dozens. Half of all maps under lamps reach this number, and ten
+/// times as many halvings would lower the bounds by some per cent.
 const MAX_SPLITS: usize = 100;
 /// Number of halvings after which bounds are reported even if they are infinite. A simplex has no
 /// bound where the light sees its corners in opposite directions, which few halvings end.
@@ -86,9 +86,9 @@ struct Point {
     error: f64,
 }
 
-/// The largest errors in s and in t of `map` over `body` (local space), pixels per texel: never less
-/// than the true maxima, at most one per cent more under parallel light, and some per cent more under
-/// lamps.
+/// The largest errors in s and in t of `map` over `body` (local space), pixels per texel: never
+/// less than the true maxima, at most one per cent more under parallel light, and some per cent
+/// more under lamps.
 pub(crate) fn worst_in_s_and_t(
     map: &ShadowMap,
     body: &Body,
@@ -150,8 +150,9 @@ fn search(probe: &Probe<'_>, body: &Body, buffers: &mut Buffers) -> [f64; 3] {
     larger(search.best, bounds).map(|e| e / pixel)
 }
 
-/// The largest errors of a one-point map under parallel light, given by its shape, over a body whose
-/// vertices are at `seen` in light space. As those of [`worst_in_s_and_t`] and [`worst_direction`], which take longer.
+/// The largest errors of a one-point map under parallel light, given by its shape, over a body
+/// whose vertices are at `seen` in light space. As those of [`worst_in_s_and_t`] and
+/// [`worst_direction`], which take longer.
 ///
 /// m_s = w/z and m_t = w²/z, up to factors, are largest at vertices. The error in the worst
 /// direction is w/z times the norm of a matrix that is affine in x and z. Both factors are largest
@@ -374,8 +375,8 @@ impl Probe<'_> {
         // logarithmic rows this ratio has light space's own w as a further factor.)
         let mean = corners.iter().map(|c| c.normal_t).sum::<DVec3>().normalize_or_zero();
         let normal = Self::towards_all(mean, corners, &|c| c.normal_t, || {
-            // N = w ∇T − T ∇w, where t = T/w. So N · n = w |∇T × ∇w|²/|∇w|² > 0 for the part n of ∇T
-            // across ∇w.
+            // N = w ∇T − T ∇w, where t = T/w. So N · n = w |∇T × ∇w|²/|∇w|² > 0 for the part n of
+            // ∇T across ∇w.
             let [t, w] = [1, 3].map(|i| self.map.shadow_from_local.row(i).truncate());
             let w = w.normalize_or_zero();
             (t - w * w.dot(t)).normalize_or_zero()

@@ -347,8 +347,8 @@ fn odd_input_gives_sound_plans() {
     }
 }
 
-/// Where light falls almost exactly across a rolled camera, its image after the viewer's perspective
-/// lies at infinity but for rounding, however small the rest is.
+/// Where light falls almost exactly across a rolled camera, its image after the viewer's
+/// perspective lies at infinity but for rounding, however small the rest is.
 #[test]
 fn a_light_almost_across_the_view_is_planned() {
     for tiny in (0..310).map(|digits| 10f64.powi(-digits)).chain([0.0]) {
@@ -373,8 +373,8 @@ fn a_light_almost_across_the_view_is_planned() {
     }
 }
 
-/// A wide spot light has six maps, those of a point light as far as they lie in its cone, also where
-/// its cone is a half-space. What it does not light needs no texels.
+/// A wide spot light has six maps, those of a point light as far as they lie in its cone, also
+/// where its cone is a half-space. What it does not light needs no texels.
 #[test]
 fn wide_spots_are_parts_of_point_lights() {
     let camera = Camera::look_at(VIEW).unwrap();

@@ -39,8 +39,8 @@ fn plan(camera: &Camera, config: &Config, technique: &Technique) -> Plan {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 800, max_global_rejects: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Both views' maps have the same errors. (`psm` undoes the perspective by a map that is sheared
-    /// even where none is left, and in orthographic views it is `uniform`.)
+    /// Both views' maps have the same errors. (`psm` undoes the perspective by a map that is
+    /// sheared even where none is left, and in orthographic views it is `uniform`.)
     #[test]
     fn errors_are_those_of_a_distant_view(
         config in orthographic(),

@@ -366,8 +366,9 @@ proptest! {
                 let plan = planner.plan(&config.camera, &[config.light], &config.bounds, &technique);
                 plan.unwrap().clone()
             };
-            // In an orthographic view along the light all slices need almost the same texels, however
-            // they are laid. There the best of some trials is taken, beginning with even slices.
+            // In an orthographic view along the light all slices need almost the same texels,
+            // however they are laid. There the best of some trials is taken, beginning with even
+            // slices.
             let of_even = if config.camera.is_orthographic() {
                 let even = plan(Partition { splits: Splits::SelfSimilar, ..partition });
                 let storages = even.maps.iter().map(|m| m.storage_factor).filter(|&s| s > 0.0);
@@ -399,8 +400,8 @@ proptest! {
     }
 }
 
-/// A lamp at the eye sees the side faces edge-on, and has no direction that could tell which of them
-/// to use. It is planned for all the same, as a lamp beside the eye is, with similar errors.
+/// A lamp at the eye sees the side faces edge-on, and has no direction that could tell which of
+/// them to use. It is planned for all the same, as a lamp beside the eye is, with similar errors.
 #[test]
 fn a_lamp_in_the_eye() {
     let camera = reference_view();

@@ -201,8 +201,8 @@ proptest! {
         prop_assert_eq!(format!("{again:?}"), format!("{fresh:?}"));
     }
 
-    /// Where some lights alone have changed, a planner keeps the maps of the others. The plan is that
-    /// of a new planner, to the last bit.
+    /// Where some lights alone have changed, a planner keeps the maps of the others. The plan is
+    /// that of a new planner, to the last bit.
     #[test]
     fn kept_maps_are_those_of_a_new_plan(
         config in config(),

@@ -35,8 +35,8 @@ pub(crate) struct Render {
     /// Rays along each side of a pixel: K×K samples.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
-    /// Size of the light in the truth: an angle for a sun, as in 0.53deg, or a length for a lamp, as
-    /// in 0.2m. Only for `--aov truth` and `--aov difference`.
+    /// Size of the light in the truth: an angle for a sun, as in 0.53deg, or a length for a lamp,
+    /// as in 0.2m. Only for `--aov truth` and `--aov difference`.
     #[arg(long, value_name = "SIZE", value_parser = values::light_size, allow_hyphen_values = true)]
     pub(crate) light_size: Option<LightSize>,
     /// What the map is fitted to.

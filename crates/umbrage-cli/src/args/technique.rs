@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use umbrage::visibility::LightSize;
 use umbrage_lab::{Backend, ComparisonOptions, NamedTechnique};
 
-/// What is compared if not told: the papers' maps, and what renderers ship beside its counterpart of
-/// this library.
+/// What is compared if not told: the papers' maps, and what renderers ship beside its counterpart
+/// of this library.
 pub(crate) const DEFAULT_TECHNIQUES: [&str; 7] =
     ["uniform", "psm", "lispsm", "tsm", "adaptive", "uniform(stable)+z4:pcf3", "adaptive:pcf3"];
 
@@ -43,9 +43,9 @@ pub(crate) struct ComparisonArgs {
     /// comparisons use 1.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(crate) samples: u32,
-    /// Size of the light: an angle for a sun, as in 0.53deg, or a length for a lamp, as in 0.2m. The
-    /// soft shadows of a light of this size are then the truth for soft techniques (pcss, and blurs
-    /// in metres); all others are measured against the sharp ones.
+    /// Size of the light: an angle for a sun, as in 0.53deg, or a length for a lamp, as in 0.2m.
+    /// The soft shadows of a light of this size are then the truth for soft techniques (pcss, and
+    /// blurs in metres); all others are measured against the sharp ones.
     #[arg(long, value_name = "SIZE", value_parser = values::light_size, allow_hyphen_values = true)]
     pub(crate) light_size: Option<LightSize>,
 }

@@ -26,8 +26,8 @@ pub(crate) struct SceneChangeArgs {
     /// Alpha-masked materials cast and show as solid.
     #[arg(long)]
     pub(crate) opaque: bool,
-    /// Leave nodes out, with all below them, by name or number (`umbrage info` lists them); once for
-    /// each. NAME:casting casts no shadow but is seen, NAME:receiving casts but is not seen.
+    /// Leave nodes out, with all below them, by name or number (`umbrage info` lists them); once
+    /// for each. NAME:casting casts no shadow but is seen, NAME:receiving casts but is not seen.
     #[arg(long, value_name = "NAME")]
     pub(crate) without: Vec<String>,
     /// Put ground under the scene, such as a single model.

@@ -84,8 +84,8 @@ pub(super) fn of_sweep(sweep: &Sweep, means: &[Mean]) -> Finding {
     }
 }
 
-/// The verdict on techniques of these names; `None` if there is no competition. `mean` says what the
-/// figures are, after them.
+/// The verdict on techniques of these names; `None` if there is no competition. `mean` says what
+/// the figures are, after them.
 fn verdict(
     names: &[&str],
     judged: &[Option<Judged>],

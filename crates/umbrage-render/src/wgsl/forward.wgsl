@@ -3,8 +3,8 @@
 
 struct View {
     clip_from_render: mat4x4f,
-    // The line of sight through the point (x, y) of the target has the direction of unit depth ray +
-    // x ray_x + y ray_y. In orthographic views all directions are `ray`, and the line begins at x
+    // The line of sight through the point (x, y) of the target has the direction of unit depth ray
+    // + x ray_x + y ray_y. In orthographic views all directions are `ray`, and the line begins at x
     // ray_x + y ray_y from where the first one begins.
     ray: vec3f,
     // Number of samples along each side of a pixel.
@@ -168,8 +168,8 @@ fn to_light(position: vec3f) -> vec3f {
 }
 
 // Whether the light reaches a surface if nothing lies between them. Whether a surface that is
-// edge-on to the light faces it would change from pixel to pixel in single precision. Such a surface
-// faces a lamp, whose light grazes it, and does not face a sun.
+// edge-on to the light faces it would change from pixel to pixel in single precision. Such a
+// surface faces a lamp, whose light grazes it, and does not face a sun.
 fn faces_light(position: vec3f, normal: vec3f, normal_error: f32) -> bool {
     let light = to_light(position);
     let cosine = dot(normal, light);

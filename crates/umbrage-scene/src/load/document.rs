@@ -71,8 +71,8 @@ impl<'a> Document<'a> {
         let marked = json.strip_prefix(BYTE_ORDER_MARK);
         let has_byte_order_mark = marked.is_some();
         let json = marked.unwrap_or(&json);
-        // Objects as short as `{}` take a hundred times their length when they are parsed. Nodes are
-        // the largest kind.
+        // Objects as short as `{}` take a hundred times their length when they are parsed. Nodes
+        // are the largest kind.
         let objects = json.iter().filter(|&&b| b == b'{').count() as u64;
         budget.take("JSON", objects, "objects", size_of::<Node>())?;
         budget.take("JSON", json.len() as u64, "characters", 1)?;
@@ -262,8 +262,8 @@ impl Notices {
         self.count(place, 0, what, "");
     }
 
-    /// Notes a repair of one thing at `place`, whose reason differs from place to place. That of the
-    /// first place is told.
+    /// Notes a repair of one thing at `place`, whose reason differs from place to place. That of
+    /// the first place is told.
     pub(super) fn add_because(&mut self, place: impl Display, what: &str, why: &str) {
         self.count(place, 0, what, why);
     }

@@ -26,8 +26,8 @@ struct Accessors {
 }
 
 impl Copies {
-    /// How many copies a node draws; `None` if it draws its mesh once, where it is. That is also the
-    /// case if the extension has only custom attributes, so that all copies coincide.
+    /// How many copies a node draws; `None` if it draws its mesh once, where it is. That is also
+    /// the case if the extension has only custom attributes, so that all copies coincide.
     ///
     /// # Errors
     /// An attribute is no accessor's index.

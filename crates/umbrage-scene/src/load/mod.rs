@@ -39,18 +39,18 @@ const WORLD_END: f64 = 1e12;
 pub const SCENE_BYTES: u64 = 2 << 30;
 
 /// What an instance counts, bytes. It takes a fifth of that itself. A few bytes of a file can make
-/// any number of instances, and whoever draws or traces them keeps more for each, so what these need
-/// counts too.
+/// any number of instances, and whoever draws or traces them keeps more for each, so what these
+/// need counts too.
 const INSTANCE_BYTES: usize = 512;
 
 /// Reads a scene from a `.gltf` or `.glb` file; the content tells which of the two it is.
 ///
-/// The file's default scene is loaded in the pose that its nodes have: skins and the default weights
-/// of morph targets are applied, animations are not played. It consists of triangles with base
-/// colour, `MASK` alpha (of factor, texture and vertices) and normals, of cameras, and of the lights
-/// of `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, including those
-/// of `EXT_mesh_gpu_instancing`. Nodes that `KHR_node_visibility` hides are left out, with all below
-/// them but their cameras. Textures are PNG or JPEG images with the transform of
+/// The file's default scene is loaded in the pose that its nodes have: skins and the default
+/// weights of morph targets are applied, animations are not played. It consists of triangles with
+/// base colour, `MASK` alpha (of factor, texture and vertices) and normals, of cameras, and of the
+/// lights of `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, including
+/// those of `EXT_mesh_gpu_instancing`. Nodes that `KHR_node_visibility` hides are left out, with
+/// all below them but their cameras. Textures are PNG or JPEG images with the transform of
 /// `KHR_texture_transform`; they are interpolated as their sampler's `magFilter` says, without mip
 /// levels. Buffers and images are read from the file itself, from data URIs, and from regular files
 /// below the scene's folder.
@@ -68,8 +68,8 @@ const INSTANCE_BYTES: usize = 512;
 /// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
 /// Vertex colours, emission, textures other than that of the base colour, animations, scenes other
-/// than the default one and other extensions are not supported and are left out, also with a notice.
-/// Both sides of every surface show, whatever `doubleSided` says.
+/// than the default one and other extensions are not supported and are left out, also with a
+/// notice. Both sides of every surface show, whatever `doubleSided` says.
 ///
 /// # Errors
 /// The file cannot be read, is cut off, refers to files outside its folder or to pipes or devices,
@@ -177,7 +177,8 @@ fn has_lamps(document: &Document, hierarchy: &Hierarchy) -> bool {
 }
 
 impl Loader<'_> {
-    /// Loads a node's mesh, and notes the node. `parent` is the place of its parent among the nodes.
+    /// Loads a node's mesh, and notes the node. `parent` is the place of its parent among the
+    /// nodes.
     fn load_node(&mut self, index: usize, parent: Option<usize>) -> Result<(), SceneError> {
         let begin = self.scene.instances.len();
         self.load_mesh(index)?;

@@ -3,8 +3,8 @@ use glam::DVec3;
 use umbrage::{Aabb, Camera, Plane};
 
 /// A surface counts as seen edge-on if the eye is nearer to its plane than this share of the
-/// distance to its farthest corner, or under parallel rays if this is the sine of their angle to the
-/// plane. It hides nothing then.
+/// distance to its farthest corner, or under parallel rays if this is the sine of their angle to
+/// the plane. It hides nothing then.
 const EDGE_ON: f64 = 1e-9;
 
 impl Scene {

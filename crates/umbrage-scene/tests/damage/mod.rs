@@ -1,5 +1,5 @@
-//! Files cut short and with bytes or JSON changed, the same way each time, and what must hold of what
-//! loads.
+//! Files cut short and with bytes or JSON changed, the same way each time, and what must hold of
+//! what loads.
 #![allow(dead_code, reason = "each test binary uses its share")]
 
 use glam::DVec3;

@@ -21,9 +21,9 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// Finds cells that together hold every receiver that `camera` sees, relative to its eye, except
-    /// those in `moving`. `boxes` hold all receivers that were not seen. `None` if the camera
-    /// has moved too far.
+    /// Finds cells that together hold every receiver that `camera` sees, relative to its eye,
+    /// except those in `moving`. `boxes` hold all receivers that were not seen. `None` if the
+    /// camera has moved too far.
     ///
     /// The corners of a cell have the order of [`Aabb::corners`]: bit 0 of the index picks the
     /// right, bit 1 the upper and bit 2 the nearer side.
@@ -75,8 +75,8 @@ impl SeenTile {
             let nearest = nearnesses.iter().fold(floor, |n, [_, hi]| n.max(*hi));
             nearnesses = [[floor, nearest]; 4];
         }
-        // Flat cells get a thickness far below the resolution of single precision, so that they have
-        // an inside.
+        // Flat cells get a thickness far below the resolution of single precision, so that they
+        // have an inside.
         let farthest = nearnesses.iter().flatten().fold(0.0, |most: f64, w| most.max(w.abs()));
         let pad = 1e-7 * (camera.scale_at(0.0) + farthest);
         std::array::from_fn(|i| {

@@ -13,8 +13,8 @@
 //! w(X) − w(P) replaced by the nearness of the silhouette's near side, and the gap opens by
 //! no more than this with the silhouette's jump of nearness.
 //!
-//! An orthographic picture only shifts where the camera moves without turning, so nothing comes into
-//! view but at its edges. Where the camera turns, gaps open as for an eye infinitely far away.
+//! An orthographic picture only shifts where the camera moves without turning, so nothing comes
+//! into view but at its edges. Where the camera turns, gaps open as for an eye infinitely far away.
 
 use super::{BEYOND, SeenTile, SeenTiles, beyond, depth, nearness, tile_pixels};
 use crate::bounds::{Aabb, Plane};

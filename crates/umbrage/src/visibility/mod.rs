@@ -15,10 +15,10 @@
 //!   a surface bends towards the light within a texel, it rises above the receiver's plane. A map
 //!   resolves nothing smaller than its texels, so it cannot distinguish such a rise from an
 //!   occluder this near.
-//! - g is the rise of the receiver's plane over 1/256 of a texel in s and in t. Rasterisers move the
-//!   corners of triangles to a grid as fine as that. Where the light grazes a surface, all of its
-//!   depths may lie within a few texels, and it would shadow itself if it is drawn beside its place.
-//!   Elsewhere g is much less than h. [`slack`] is the sum of both.
+//! - g is the rise of the receiver's plane over 1/256 of a texel in s and in t. Rasterisers move
+//!   the corners of triangles to a grid as fine as that. Where the light grazes a surface, all of
+//!   its depths may lie within a few texels, and it would shadow itself if it is drawn beside its
+//!   place. Elsewhere g is much less than h. [`slack`] is the sum of both.
 //! - 2⁻²⁵ is half a unit in the last place of depths stored in single precision.
 //!
 //! Casters in front of the receivers are clamped to depth 0 and must hide every receiver. The limit
@@ -312,8 +312,8 @@ pub fn shadow_coordinates(map: &ShadowMap, texel: DVec2) -> DVec2 {
     DVec2::new(texel.x / width, map.rows.t_from_row(texel.y / height))
 }
 
-/// How much less than on the receiver's plane the depth of a texel must be to hide the receiver, but
-/// for rounding: h + g as in the [module's documentation](self).
+/// How much less than on the receiver's plane the depth of a texel must be to hide the receiver,
+/// but for rounding: h + g as in the [module's documentation](self).
 pub fn slack(map: &ShadowMap, receiver: &Receiver) -> f64 {
     let [width, height] = map.resolution.map(f64::from);
     let texels = DVec2::new(width, height * map.rows.row_derivative(receiver.st.y));

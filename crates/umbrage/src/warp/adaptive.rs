@@ -123,8 +123,8 @@ impl Search {
             last_was_low = Some(is_low);
             reach = if is_again { 8.0 * reach } else { 0.5 * tolerance };
             let further = if is_again { 4.0 } else { 1.0 };
-            // Where the slopes approach each other there is no kink, and the minimum is a root of the
-            // slope.
+            // Where the slopes approach each other there is no kink, and the minimum is a root of
+            // the slope.
             let is_smooth = hi.2 - lo.2 < 0.25 * jump;
             let meet = if is_smooth { lo.0 - lo.2 * width / (hi.2 - lo.2) } else { meet };
             let next = match is_low {

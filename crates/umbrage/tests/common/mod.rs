@@ -646,8 +646,8 @@ pub(crate) fn check_served(config: &Config, plan: &Plan, points: &[DVec3]) -> Re
             }
             let beam = map.beam(shadow.truncate()).ok_or_else(|| nothing("no beam", shadow))?;
             let off = (p - beam.origin).reject_from_normalized(beam.direction).length();
-            // A lamp's beam is directed from the lamp to a point at its near distance. The rounding of
-            // that point's coordinates turns the beam.
+            // A lamp's beam is directed from the lamp to a point at its near distance. The rounding
+            // of that point's coordinates turns the beam.
             let from_lamp = config.light.position().map_or(0.0, |lamp| {
                 let size = (lamp - config.camera.eye()).abs().max_element();
                 size * 1e-15 * p.distance(lamp) / beam.reach_back
