@@ -72,25 +72,33 @@ impl Light {
     /// Whether shadows fall at a world point: whether the point lies no nearer to the light than
     /// the light's `near` distance.
     pub fn casts_at(&self, world_position: DVec3) -> bool {
-        let along_axes = |position: DVec3| (world_position - position).abs().max_element();
-        match self {
-            Self::Directional { .. } => true,
-            Self::Spot(spot) if spot.is_wide() => along_axes(spot.position) >= spot.near,
-            Self::Spot(spot) => spot.depth(world_position) >= spot.near,
-            Self::Point(point) => along_axes(point.position) >= point.near,
+        match (self.as_point(), self) {
+            (Some(point), _) => (world_position - point.position).abs().max_element() >= point.near,
+            (None, Self::Spot(spot)) => spot.depth(world_position) >= spot.near,
+            (None, _) => true,
         }
     }
 
     /// Distance of a world point from the light as a share of the light's `range`: the light ends
     /// at 1. It is 0 under parallel light.
     pub fn share_of_range(&self, world_position: DVec3) -> f64 {
-        match self {
-            Self::Directional { .. } => 0.0,
+        match (self.as_point(), self) {
+            (Some(point), _) => world_position.distance(point.position) / point.range,
+            (None, Self::Spot(spot)) => spot.depth(world_position) / spot.range,
+            (None, _) => 0.0,
+        }
+    }
+
+    /// The point light whose maps and distances the light has: itself, or the one that a
+    /// [wide](SpotLight::is_wide) spot light is a part of.
+    fn as_point(&self) -> Option<PointLight> {
+        match *self {
             Self::Spot(spot) if spot.is_wide() => {
-                world_position.distance(spot.position) / spot.range
+                let SpotLight { position, near, range, .. } = spot;
+                Some(PointLight { position, near, range })
             }
-            Self::Spot(spot) => spot.depth(world_position) / spot.range,
-            Self::Point(point) => world_position.distance(point.position) / point.range,
+            Self::Point(point) => Some(point),
+            _ => None,
         }
     }
 
@@ -133,14 +141,11 @@ impl Light {
     /// The sides of the cube through which the light's maps look, one for each projector; `None`
     /// for the projector of a light without a cube.
     pub(crate) fn sides(&self) -> &'static [Option<CubeSide>] {
-        use CubeSide::{NegX, NegY, NegZ, PosX, PosY, PosZ};
-        match self {
-            Self::Spot(spot) if !spot.is_wide() => &[None],
-            Self::Directional { .. } => &[None],
-            Self::Spot(_) | Self::Point(_) => {
-                &[Some(PosX), Some(NegX), Some(PosY), Some(NegY), Some(PosZ), Some(NegZ)]
-            }
-        }
+        const OF_CUBE: [Option<CubeSide>; 6] = {
+            let [a, b, c, d, e, f] = CubeSide::ALL;
+            [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f)]
+        };
+        if self.as_point().is_some() { &OF_CUBE } else { &[None] }
     }
 
     /// The projection through one of the light's [sides](Self::sides). The light must have been
