@@ -38,7 +38,7 @@ fn main() -> AppExit {
     example
         .app(Arguments::new())
         .insert_resource(ClearColor(Color::srgb(0.02, 0.03, 0.06)))
-        .insert_resource(GlobalAmbientLight { brightness: 30.0, ..default() })
+        .insert_resource(GlobalAmbientLight { brightness: 60.0, ..default() })
         .add_systems(Startup, (courtyard, lights, camera))
         .add_systems(Update, (fly::fly, sweep, wander))
         .run()
@@ -85,7 +85,7 @@ fn lights(mut builder: Builder) {
     builder.commands.spawn((
         DirectionalLight {
             color: Color::srgb(0.7, 0.8, 1.0),
-            illuminance: 300.0,
+            illuminance: 600.0,
             shadow_maps_enabled: true,
             ..default()
         },
@@ -106,7 +106,7 @@ fn lights(mut builder: Builder) {
         builder.commands.spawn((
             SpotLight {
                 color: colour,
-                intensity: 4_000_000.0,
+                intensity: 8_000_000.0,
                 range: 40.0,
                 outer_angle: 0.35,
                 inner_angle: 0.25,
@@ -124,7 +124,7 @@ fn lights(mut builder: Builder) {
         builder.commands.spawn((
             PointLight {
                 color: Color::srgb(1.0, 0.8, 0.6),
-                intensity: 120_000.0,
+                intensity: 250_000.0,
                 range: 15.0,
                 shadow_maps_enabled: true,
                 ..default()

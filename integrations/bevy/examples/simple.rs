@@ -32,11 +32,11 @@ fn main() -> AppExit {
 fn light_and_camera(mut commands: Commands) {
     commands.spawn((
         DirectionalLight { shadow_maps_enabled: true, ..default() },
-        Transform::from_xyz(0.75, 0.8, 0.45).looking_at(Vec3::ZERO, Vec3::Y),
+        Transform::from_xyz(0.7, 0.55, 0.45).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     commands.spawn((
         Camera3d::default(),
-        Transform::from_xyz(-2.2, 1.8, 15.0).looking_at(Vec3::new(-3.4, 1.2, 0.0), Vec3::Y),
+        Transform::from_xyz(-3.6, 1.9, 7.5).looking_at(Vec3::new(-6.6, 0.6, -2.0), Vec3::Y),
         fly::Fly,
     ));
 }

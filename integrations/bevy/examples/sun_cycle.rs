@@ -80,7 +80,7 @@ fn move_sun(day: Res<Day>, sun: Single<(&mut Transform, &mut DirectionalLight)>)
     let height = turn.sin() * NOON_RAD.sin();
     // The sun rises and sets almost along the street, where no house keeps low light out.
     let towards_sun =
-        Quat::from_rotation_y(1.1) * Vec3::new(turn.cos(), height, turn.sin() * NOON_RAD.cos());
+        Quat::from_rotation_y(1.6) * Vec3::new(turn.cos(), height, turn.sin() * NOON_RAD.cos());
 
     let (mut transform, mut light) = sun.into_inner();
     *transform = Transform::default().looking_to(-towards_sun, Vec3::Y);

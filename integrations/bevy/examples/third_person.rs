@@ -18,10 +18,10 @@ use std::f32::consts::{PI, TAU};
 
 /// Where the character walks when nobody steers.
 const WAYPOINTS: [Vec3; 4] = [
-    Vec3::new(-1.5, 0.0, 8.0),
-    Vec3::new(1.5, 0.0, 6.0),
-    Vec3::new(1.5, 0.0, -14.0),
-    Vec3::new(-1.5, 0.0, -12.0),
+    Vec3::new(-0.7, 0.0, 8.0),
+    Vec3::new(0.7, 0.0, 6.0),
+    Vec3::new(0.7, 0.0, -14.0),
+    Vec3::new(-0.7, 0.0, -12.0),
 ];
 const WALK_METRES_PER_SECOND: f32 = 1.5;
 const TURN_RAD_PER_SECOND: f32 = 2.0;
@@ -106,7 +106,7 @@ fn character(mut builder: Builder) {
 fn casters(mut builder: Builder) {
     let metal = builder.paint(0.25, 0.27, 0.30);
     let paints = [builder.paint(0.25, 0.40, 0.65), builder.paint(0.80, 0.70, 0.30)];
-    for (paint, (x, phase)) in paints.iter().zip([(-2.9, 0.0), (2.9, 2.0)]) {
+    for (paint, (x, phase)) in paints.iter().zip([(-3.0, 2.5), (3.0, 1.0)]) {
         let mut parts = vec![
             builder.block(paint, Vec3::Y * 0.3, Vec3::new(1.7, 0.6, 4.0)),
             builder.block(paint, Vec3::Y * 0.9, Vec3::new(1.5, 0.55, 2.0)),

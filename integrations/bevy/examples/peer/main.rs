@@ -28,11 +28,12 @@ peer --scene FILE.glb --eye x,y,z --target x,y,z --fov DEG --near N --far F --su
   --filter NAME            hardware2x2 | gaussian (Bevy's default) | temporal
   --depth-bias B           0.02 (Bevy's default); Umbrage uses none
   --normal-bias B          1.8 (Bevy's default); Umbrage uses none
-  --world-scale S          1: multiplies scene, camera and distances (Bevy's biases and its whole-metre
-                           cascade sizes are absolute)
+  --world-scale S          1: multiplies scene, camera and distances (Bevy's biases and its
+                           whole-metre cascade sizes are absolute)
   --frames N               20: frames timed with shadows on, and as many with shadows off
   --warmup N               4 (at least 2): frames drawn before each timed block
---fov is vertical; --sun is the direction in which light travels; +y is up.";
+--fov is vertical; --sun is the direction in which light travels; +y is up. planning_ms is the time
+of a plan that finds all as in the frame before, because the camera stands still.";
 
 const KNOWN: &[&str] = &[
     "scene",

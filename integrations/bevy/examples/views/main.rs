@@ -31,9 +31,10 @@ adaptive+z4@2048, whose maps have 2048² texels in all; without @ each has --map
   --frames N           8: frames timed with shadows, and as many without
   --turn DEG           also draws N frames in which the camera turns by DEG about the vertical in
                        all. Errors are then means over these frames, planning is timed in them, and
-                       flicker is measured: how much the shadows on a point change from one frame's
-                       maps to the next frame's, where the truth does not
-Truths are kept in target/truth.";
+                       flicker is measured: how much the shadow on a point changes from one frame's
+                       maps to the next frame's, where the truth does not, in the same slice
+Truths are kept in target/truth. Without --turn, planning is timed in a still view, where plans find
+all as in the frame before.";
 
 const KNOWN: &[&str] = &[
     "views", "view", "scenes", "filter", "cascades", "map-size", "method", "msaa", "frames", "turn",
@@ -164,6 +165,9 @@ impl Run {
         let turn = options.number("turn")?;
         if turn.is_some_and(|turn| turn.abs() > 360.0) {
             return Err(wrong("turn", "must be 360 degrees at most"));
+        }
+        if deferred && msaa != Msaa::Off {
+            return Err(wrong("msaa", "must be 1 with --method deferred"));
         }
         let least = if turn.is_some() { 2 } else { 1 };
         let filter = options.text("filter").unwrap_or("hardware2x2");
@@ -302,7 +306,9 @@ impl Run {
         line("geometric mean", &|column, v| percent(mean_of(column, v)));
         if let Some(off) = off {
             line("ratio to `off`", &|column, v| {
-                let ratio = mean_of(column, v).zip(mean_of(column, off)).map(|(a, b)| a / b);
+                // Of what does not flicker at all, nothing is a multiple.
+                let off = mean_of(column, off).filter(|share| *share > LEAST_SHARE);
+                let ratio = mean_of(column, v).zip(off).map(|(a, b)| a / b);
                 ratio.map_or("–".into(), |ratio| format!("{ratio:.3}"))
             });
         }
@@ -337,8 +343,8 @@ impl Drawn {
 
 /// Draws the frames of a motion, and returns the times of their plans with them. Where the program
 /// `umbrage` follows a point back to the frame before, this draws the new frame with the maps of the
-/// frame before. Both look the same point up in both frames' maps. Slices go by the new frame's
-/// depths in both, so a point that changes its slice is asked in the same one of both.
+/// frame before. Both look the same point up in both frames' maps. But Bevy chooses the slice by the
+/// new frame's depth here, so what changes because a point passes from slice to slice is not found.
 fn turn(harness: &mut Harness, frames: &[View]) -> Result<(Vec<Drawn>, Vec<f64>), String> {
     let pose = |frame: &View| {
         let point = frame.view_point();

@@ -16,7 +16,8 @@ impl Pixel {
     const LIT: u8 = 2;
     /// The same point counts in the frame before.
     const STEADY: u8 = 4;
-    /// The surface seen faces the sun as much as a pixel of Bevy's picture must to count.
+    /// The normal with which the seen surface is shaded faces the sun as much as it must where a
+    /// pixel of Bevy's picture counts.
     const BRIGHT: u8 = 8;
 
     pub(crate) fn counts(self) -> bool {
@@ -79,10 +80,13 @@ pub(crate) fn truth(
     Ok(known.into_iter().flatten().collect())
 }
 
+/// To be changed with the meaning of the files, or with how rays are traced.
+const VERSION: u32 = 1;
+
 /// The file in which a frame's truth is kept.
 fn file(view: &View, scene: &[u8], now: Camera, last: Option<Camera>, folder: &Path) -> PathBuf {
     let mut hasher = DefaultHasher::new();
-    scene.hash(&mut hasher);
+    (VERSION, scene).hash(&mut hasher);
     // Of a camera and a light the text has all digits.
     format!("{now:?} {last:?} {:?}", view.light()).hash(&mut hasher);
     folder.join(format!("{}-{:016x}.bin", view.name, hasher.finish()))
@@ -109,8 +113,7 @@ fn trace(
         let steady = |last: &umbrage_trace::View| {
             last.sees(&sample.surface).is_some_and(|was| last.counts(was.is_facing, was.depth))
         };
-        let bright = sample.is_facing
-            && shade::incidence(&light, &sample.surface) > crate::harness::LEAST_COSINE;
+        let bright = shade::incidence(&light, &sample.surface) > crate::harness::LEAST_COSINE;
         let mut bits = 0;
         for (bit, is_set) in [
             (Pixel::COUNTS, counts),
