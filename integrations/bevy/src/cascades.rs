@@ -131,6 +131,7 @@ fn plan_cascades(
         ));
     }
     status.planning = Duration::ZERO;
+    status.problem = None;
     // With Bevy's own lookup planned cascades gain little, and warps nothing.
     if !enabled.0 || status.lookup != Lookup::Umbrage {
         return;
@@ -222,7 +223,9 @@ fn plan_cascades(
             }
         }
         if let Some(error) = failure {
-            kept.warn_once(format!("the cascades of {light} stay Bevy's own: {error}"));
+            let problem = format!("the cascades of {light} stay Bevy's own: {error}");
+            kept.warn_once(problem.clone());
+            status.problem = Some(problem);
         }
         let Some(written) = planned_config else { continue };
         if !is_same(&config, &written) {

@@ -28,6 +28,9 @@ pub struct UmbrageStatus {
     pub lookup: Lookup,
     /// The time that all plans of the last frame took.
     pub planning: Duration,
+    /// Why a light's cascades were Bevy's own in the last frame, although it has
+    /// [`UmbrageShadows`](crate::UmbrageShadows).
+    pub problem: Option<String>,
     /// Whether depths are clamped under a warp on devices that cannot clamp depths themselves.
     pub(crate) clamps_warped_depths: bool,
 }

@@ -310,6 +310,8 @@ fn bad_input_leaves_bevys_cascades() {
         }
         assert_eq!(config(&app, light).bounds.len(), 4, "{what}");
         assert_eq!(cascades(&app, light, view).len(), 4, "{what}");
+        let problem = app.world().resource::<UmbrageStatus>().problem.as_ref();
+        assert!(problem.is_some_and(|p| p.contains("stay Bevy's own: ")), "{what}: {problem:?}");
     }
 }
 

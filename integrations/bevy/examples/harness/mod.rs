@@ -449,10 +449,13 @@ impl Harness {
     }
 
     /// # Errors
-    /// If anything has failed on the device so far.
+    /// If anything has failed on the device so far, or if the last frame's plans have failed.
     pub(crate) fn check(&self) -> Result<(), String> {
-        match self.app.world().get_resource::<Failure>() {
-            Some(Failure(why)) => Err(why.clone()),
+        if let Some(Failure(why)) = self.app.world().get_resource::<Failure>() {
+            return Err(why.clone());
+        }
+        match self.status().and_then(|status| status.problem.as_ref()) {
+            Some(why) => Err(why.clone()),
             None => Ok(()),
         }
     }
