@@ -1,11 +1,15 @@
-//! Built-in scenes against the ray-traced truth of `umbrage-trace`.
+//! Built-in scenes against the ray-traced truth of `umbrage-trace`. Where the environment variable
+//! `UMBRAGE_PICTURES` names a folder, the pictures are written there, to be looked at: the one that
+//! Bevy draws, and below it the wrong pixels, orange for false light and blue for false shadow.
 
-use crate::harness::{Harness, Setup, Umbrage, ViewPoint, counts, visibility};
+use crate::harness::{Harness, Measured, Setup, Umbrage, ViewPoint, counts, visibility};
 use bevy::light::ShadowFilteringMethod;
 use bevy::prelude::*;
 use bevy_umbrage::UmbrageShadows;
 use bevy_umbrage::umbrage::glam::DVec3;
 use bevy_umbrage::umbrage::{Camera, Light, LookAt};
+use image::{Rgb, RgbImage};
+use std::path::Path;
 use umbrage_testing::needs;
 use umbrage_trace::{Sample, Tracer, View};
 
@@ -69,7 +73,7 @@ impl Case {
         &self,
         scene: &umbrage_scene::Scene,
         truth: &[Option<f32>],
-        umbrage: Umbrage,
+        (name, umbrage): (&str, Umbrage),
         filter: ShadowFilteringMethod,
     ) -> [f32; 2] {
         let view = ViewPoint {
@@ -88,6 +92,11 @@ impl Case {
         harness.add_scene(scene).expect("a scene");
         let measured = harness.measure(1, 1).expect("a picture");
         let visible = visibility(&measured.shadowed, &measured.unshadowed);
+        if let Some(folder) = std::env::var_os("UMBRAGE_PICTURES") {
+            let file = format!("{}-{name}-{filter:?}.png", self.scene);
+            let picture = picture(&measured, &visible, truth);
+            picture.save(Path::new(&folder).join(file)).expect("a folder for pictures");
+        }
         let pixels = visible.iter().zip(truth).zip(&measured.unshadowed);
         let errors: Vec<f32> = pixels
             .filter(|(_, unshadowed)| counts(**unshadowed))
@@ -97,9 +106,28 @@ impl Case {
         let count = errors.len() as f32;
         let wrong = errors.iter().filter(|e| **e > 0.5).count() as f32 / count;
         let mean = errors.iter().sum::<f32>() / count;
-        println!("{} {filter:?}: wrong {wrong:.4}, mean {mean:.4}", self.scene);
+        println!("{} {filter:?} {name}: wrong {wrong:.4}, mean {mean:.4}", self.scene);
         [wrong, mean]
     }
+}
+
+/// What Bevy draws, and the wrong pixels below.
+fn picture(measured: &Measured, visible: &[f32], truth: &[Option<f32>]) -> RgbImage {
+    let srgb = |v: f32| (v.clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0) as u8;
+    RgbImage::from_fn(SIZE[0], 2 * SIZE[1], |x, y| {
+        let i = ((y % SIZE[1]) * SIZE[0] + x) as usize;
+        let unshadowed = measured.unshadowed[i];
+        if y < SIZE[1] {
+            // Some light from everywhere, so that shadows are not black.
+            let grey = srgb(1.2 * (measured.shadowed[i] + 0.2 * unshadowed) + 0.02);
+            return Rgb([grey; 3]);
+        }
+        match truth[i].filter(|_| counts(unshadowed)).map(|truth| visible[i] - truth) {
+            Some(error) if error > 0.5 => Rgb([230, 120, 0]),
+            Some(error) if error < -0.5 => Rgb([0, 90, 220]),
+            _ => Rgb([240; 3]),
+        }
+    })
 }
 
 #[needs(gpu)]
@@ -110,20 +138,22 @@ fn built_in_scenes() {
         let truth = case.truth(&scene);
         for (filter, most) in [
             (ShadowFilteringMethod::Hardware2x2, [0.4, 0.6]),
-            // The filter blurs wherever shadows end, which is most of its mean error.
-            (ShadowFilteringMethod::Gaussian, [0.4, 1.0]),
+            // The filter blurs wherever shadows end, which is most of its mean error, and hides
+            // bars that are thinner than it is wide.
+            (ShadowFilteringMethod::Gaussian, [0.6, 1.0]),
         ] {
-            let planned = |text: &str| Umbrage::Planned(text.parse().expect("a technique"));
-            let bevy = case.errors(&scene, &truth, Umbrage::Off, filter);
-            for (umbrage, share) in [
-                (Umbrage::Lookup, most),
-                (Umbrage::Planned(UmbrageShadows::default()), most),
-                (planned("adaptive+z4"), most.map(|m| 0.7 * m)),
+            let bevy = case.errors(&scene, &truth, ("off", Umbrage::Off), filter);
+            let adaptive = "adaptive+z4".parse().expect("a technique");
+            for (name, umbrage, share) in [
+                ("lookup", Umbrage::Lookup, most),
+                ("stable", Umbrage::Planned(UmbrageShadows::default()), most),
+                ("adaptive", Umbrage::Planned(adaptive), most.map(|m| 0.7 * m)),
             ] {
-                let name = format!("{} {filter:?} {umbrage:?}", case.scene);
-                let ours = case.errors(&scene, &truth, umbrage, filter);
+                let ours = case.errors(&scene, &truth, (name, umbrage), filter);
                 for i in 0..2 {
-                    assert!(ours[i] < share[i] * bevy[i], "{name}: {ours:?} of {bevy:?}");
+                    let scene = case.scene;
+                    let most = share[i] * bevy[i];
+                    assert!(ours[i] < most, "{scene} {filter:?} {name}: {ours:?} of {bevy:?}");
                 }
             }
         }
