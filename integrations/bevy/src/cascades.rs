@@ -4,14 +4,16 @@ use crate::receivers::{Boxes, Meshes};
 use crate::shaders::{Lookup, UmbrageEnabled, UmbrageStatus};
 use crate::shadows::{Receivers, UmbrageShadows};
 use bevy::camera::visibility::{VisibilitySystems, VisibleEntities};
-use bevy::ecs::entity::EntityHashMap;
+use bevy::ecs::entity::{EntityHash, EntityHashMap};
+use bevy::ecs::system::SystemParam;
 use bevy::light::cascade::{Cascade, Cascades};
 use bevy::light::{
-    CascadeShadowConfig, DirectionalLightShadowMap,
-    ShadowFilteringMethod, SimulationLightSystems, VolumetricFog,
+    CascadeShadowConfig, DirectionalLightShadowMap, ShadowFilteringMethod, SimulationLightSystems,
+    VolumetricFog,
 };
 use bevy::math::Vec3A;
 use bevy::platform::collections::HashSet;
+use bevy::platform::collections::hash_map::Entry;
 use bevy::prelude::*;
 use bevy::render::occlusion_culling::OcclusionCulling;
 use bevy::render::render_resource::WgpuFeatures;
@@ -20,8 +22,8 @@ use std::time::{Duration, Instant};
 use umbrage::glam::{DMat4, DVec2, DVec3};
 use umbrage::visibility::Filter;
 use umbrage::{
-    Bounds, Camera as UmbrageCamera, ClipDepth, Cover, Light, Partition, Planner, ShadowMap, Size,
-    Splits, Technique, Warp,
+    Bounds, BoxTree, Camera as UmbrageCamera, ClipDepth, Cover, Light, Partition, Plan, Planner,
+    ShadowMap, Size, Splits, Technique, Warp,
 };
 
 /// The set of the system that plans cascades, in [`PostUpdate`]. It follows Bevy's
@@ -111,20 +113,26 @@ impl Kept {
     }
 }
 
+/// What plans follow from, apart from the lights.
+#[derive(SystemParam)]
+struct Input<'w, 's> {
+    views: Query<'w, 's, View>,
+    meshes: Meshes<'w, 's>,
+    lamps: Query<'w, 's, Entity, (Added<UmbrageShadows>, Without<DirectionalLight>)>,
+    size: Res<'w, DirectionalLightShadowMap>,
+    device: Option<Res<'w, RenderDevice>>,
+    enabled: Res<'w, UmbrageEnabled>,
+}
+
 fn plan_cascades(
     mut commands: Commands,
     mut kept: Local<Kept>,
     mut lights: Query<PlannedLight>,
-    views: Query<View>,
-    meshes: Meshes,
-    lamps: Query<Entity, (Added<UmbrageShadows>, Without<DirectionalLight>)>,
-    size: Res<DirectionalLightShadowMap>,
-    device: Option<Res<RenderDevice>>,
-    enabled: Res<UmbrageEnabled>,
+    input: Input,
     mut status: ResMut<UmbrageStatus>,
 ) {
     let kept = &mut *kept;
-    for lamp in &lamps {
+    for lamp in &input.lamps {
         kept.warn_once(format!(
             "{lamp} has UmbrageShadows but no DirectionalLight, so nothing is planned for it; \
              the lookups of spot and point lights are bettered without it"
@@ -133,18 +141,19 @@ fn plan_cascades(
     status.planning = Duration::ZERO;
     status.problem = None;
     // With Bevy's own lookup planned cascades gain little, and warps nothing.
-    if !enabled.0 || status.lookup != Lookup::Umbrage {
+    if !input.enabled.0 || status.lookup != Lookup::Umbrage {
         return;
     }
     let begin = Instant::now();
     // Bevy's own clamping of depths, on devices that cannot clamp, does not know warps.
-    let can_warp = status.clamps_warped_depths
-        || device.is_some_and(|d| d.features().contains(WgpuFeatures::DEPTH_CLIP_CONTROL));
-    kept.boxes.retain(|view, _| views.contains(*view));
+    let has_clamp =
+        |device: &RenderDevice| device.features().contains(WgpuFeatures::DEPTH_CLIP_CONTROL);
+    let can_warp = status.clamps_warped_depths || input.device.as_deref().is_some_and(has_clamp);
     kept.planners.retain(|light, _| lights.contains(*light));
+    kept.boxes.retain(|view, _| input.views.contains(*view));
     for (view, boxes) in &mut kept.boxes {
-        if let Ok((.., visible, _, _)) = views.get(*view) {
-            boxes.find(&meshes, visible);
+        if let Ok((.., visible, _, _)) = input.views.get(*view) {
+            boxes.find(&input.meshes, visible);
         }
     }
 
@@ -159,75 +168,50 @@ fn plan_cascades(
             _ => config.clone(),
         };
         let mut technique = *shadows.technique();
+        technique.size = Size::Exact([input.size.size as u32; 2]);
         if (is_culled || !can_warp) && technique.warp != Warp::Uniform {
             technique.warp = Warp::Uniform;
-            kept.warn_once(format!("planned maps of {light} have no warp, because {}", {
-                match is_culled {
-                    true => "Bevy's occlusion culling of shadow maps does not know warps",
-                    false => "the device cannot clamp depths",
-                }
-            }));
+            let why = match is_culled {
+                true => "Bevy's occlusion culling of shadow maps does not know warps",
+                false => "the device cannot clamp depths",
+            };
+            kept.warn_once(format!("planned maps of {light} have no warp, because {why}"));
         }
         let distance = shadows.distance().or(user.bounds.last().copied()).unwrap_or_default();
-        technique.size = Size::Exact([size.size as u32; 2]);
-        let shares_bounds = cascades.cascades.len() > 1;
-        if shares_bounds {
+        if cascades.cascades.len() > 1 {
             share_splits(&mut technique, &user, distance);
         }
-        let direction = DVec3::from_array(transform.forward().to_array().map(f64::from));
-        let sun = [Light::Directional { direction }];
+        let asked = Asked {
+            sun: Light::Directional {
+                direction: DVec3::from_array(transform.forward().to_array().map(f64::from)),
+            },
+            technique,
+            distance,
+            receivers: shadows.receivers(),
+        };
         let planners = kept.planners.entry(light).or_default();
         planners.retain(|view, _| cascades.cascades.contains_key(view));
 
-        let mut planned_config = None;
-        let mut failure = None;
+        let mut written = None;
         for (&view, cascades) in &mut cascades.cascades {
-            let Ok((pose, projection, camera, visible, filter, sees_fog)) = views.get(view) else {
-                continue;
-            };
-            let Some(image) = camera.physical_target_size() else { continue };
-            technique.filter = filter_of(filter);
-            let mut bounds = Bounds::default();
-            match shadows.receivers() {
-                _ if sees_fog || technique.cover == Cover::Stable => {}
-                Receivers::View => {}
-                Receivers::Box(aabb) => {
-                    let point = |p: Vec3A| DVec3::from_array(p.to_array().map(f64::from));
-                    bounds.receivers = Some(umbrage::Aabb::new(point(aabb.min), point(aabb.max)));
-                }
-                Receivers::Meshes => {
-                    let boxes = kept.boxes.entry(view).or_insert_with(|| {
-                        let mut boxes = Boxes::default();
-                        boxes.find(&meshes, visible);
-                        boxes
-                    });
-                    bounds.receiver_parts = boxes.tree();
-                    bounds.receivers = boxes.tree().map(umbrage::BoxTree::bounds);
-                }
-            }
             let planner = planners.entry(view).or_default();
-            let plan = UmbrageCamera::from_matrices(
-                double(pose.to_matrix()),
-                double(projection.get_clip_from_view()),
-                ClipDepth::ZeroToOne,
-                Some(f64::from(distance)),
-                image.to_array(),
-            )
-            .and_then(|camera| planner.plan(&camera, &sun, &bounds, &technique));
-            match plan {
-                Ok(plan) => {
+            let boxes = kept.boxes.entry(view);
+            match asked.plan(view, planner, boxes, &input) {
+                None => {}
+                Some(Ok(plan)) => {
                     write(cascades, &plan.maps);
-                    planned_config = Some(config_of(&plan.maps, &technique, &user, distance));
+                    written = Some(config_of(&plan.maps, &technique, &user, distance));
                 }
-                Err(error) => failure = Some(error),
+                Some(Err(error)) => {
+                    status.problem =
+                        Some(format!("the cascades of {light} stay Bevy's own: {error}"));
+                }
             }
         }
-        if let Some(error) = failure {
-            let problem = format!("the cascades of {light} stay Bevy's own: {error}");
+        if let Some(problem) = &status.problem {
             kept.warn_once(problem.clone());
-            status.problem = Some(problem);
         }
-        let Some(written) = planned_config else { continue };
+        let Some(written) = written else { continue };
         if !is_same(&config, &written) {
             config.clone_from(&written);
         }
@@ -239,6 +223,52 @@ fn plan_cascades(
         }
     }
     status.planning = begin.elapsed();
+}
+
+/// What a light asks for.
+struct Asked {
+    sun: Light,
+    technique: Technique,
+    distance: f32,
+    receivers: Receivers,
+}
+
+impl Asked {
+    /// The plan for one view; `None` if nothing is drawn for it.
+    fn plan<'a>(
+        &self,
+        view: Entity,
+        planner: &'a mut Planner,
+        boxes: Entry<'_, Entity, Boxes, EntityHash>,
+        input: &Input,
+    ) -> Option<Result<&'a Plan, umbrage::Error>> {
+        let (pose, projection, camera, visible, filter, sees_fog) = input.views.get(view).ok()?;
+        let image = camera.physical_target_size()?.to_array();
+        let technique = Technique { filter: filter_of(filter), ..self.technique };
+        let mut bounds = Bounds::default();
+        match self.receivers {
+            // Fog is lit in all the air that the camera sees.
+            _ if sees_fog || technique.cover == Cover::Stable => {}
+            Receivers::View => {}
+            Receivers::Box(aabb) => {
+                let point = |p: Vec3A| DVec3::from_array(p.to_array().map(f64::from));
+                bounds.receivers = Some(umbrage::Aabb::new(point(aabb.min), point(aabb.max)));
+            }
+            Receivers::Meshes => {
+                let boxes = boxes.or_insert_with(|| Boxes::of(&input.meshes, visible));
+                bounds.receiver_parts = boxes.tree();
+                bounds.receivers = bounds.receiver_parts.map(BoxTree::bounds);
+            }
+        }
+        let camera = UmbrageCamera::from_matrices(
+            double(pose.to_matrix()),
+            double(projection.get_clip_from_view()),
+            ClipDepth::ZeroToOne,
+            Some(f64::from(self.distance)),
+            image,
+        );
+        Some(camera.and_then(|camera| planner.plan(&camera, &[self.sun], &bounds, &technique)))
+    }
 }
 
 /// A filter that reads as far as Bevy's.

@@ -31,6 +31,13 @@ pub(crate) struct Boxes {
 }
 
 impl Boxes {
+    /// The boxes that a camera sees first.
+    pub(crate) fn of(meshes: &Meshes, visible: &VisibleEntities) -> Self {
+        let mut boxes = Self::default();
+        boxes.find(meshes, visible);
+        boxes
+    }
+
     /// Finds the boxes around the receivers that a camera may see.
     pub(crate) fn find(&mut self, meshes: &Meshes, visible: &VisibleEntities) {
         self.boxes.clear();

@@ -4,7 +4,7 @@
 //! stay as they are.
 
 use crate::debug::UmbrageDebug;
-use bevy::asset::AssetEventSystems;
+use bevy::asset::{AssetEventSystems, AssetMut};
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy::shader::{ShaderImport, Source};
@@ -88,10 +88,7 @@ const CHANGED: &[Changed] = &[
         purpose: Purpose::Lookup,
         import: "import bevy_umbrage::lights as umbrage_lights;\n",
         changes: &[
-            Change::Body {
-                name: "sample_directional_cascade",
-                fingerprint: 0xf6f5_3bd4_4533_d6bc,
-            },
+            Change::Body { name: "sample_directional_cascade", fingerprint: 0xf6f5_3bd4_4533_d6bc },
             Change::Body { name: "fetch_spot_shadow", fingerprint: 0x8f3f_ef30_527b_2c2e },
             Change::Body { name: "fetch_point_shadow", fingerprint: 0x4bc5_b81e_97c6_1233 },
         ],
@@ -226,10 +223,11 @@ fn parameters(head: &str) -> Vec<&str> {
 
 /// A number that tells whether two texts are the same but for white space (FNV-1a, 64 bits).
 fn fingerprint(text: &str) -> u64 {
-    text.split_whitespace().flat_map(|word| word.bytes().chain([b' '])).fold(
-        0xcbf2_9ce4_8422_2325,
-        |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3),
-    )
+    text.split_whitespace()
+        .flat_map(|word| word.bytes().chain([b' ']))
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
 }
 
 /// The crate's own shader modules.
@@ -374,7 +372,7 @@ fn change_shaders(
         // Bevy's renderer has not read a shader yet that was loaded in this frame.
         let shader = match loaded.contains(id) {
             true => shaders.get_mut_untracked(*id),
-            false => shaders.get_mut(*id).map(|shader| shader.into_inner()),
+            false => shaders.get_mut(*id).map(AssetMut::into_inner),
         };
         if let Some(shader) = shader {
             let changed = Shader::from_wesl(wanted, shader.path.clone());

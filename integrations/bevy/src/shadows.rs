@@ -1,8 +1,8 @@
 //! The component that asks for planned cascades.
 
-use bevy::shape::Aabb3d;
 use bevy::pbr::MAX_CASCADES_PER_LIGHT;
 use bevy::prelude::*;
+use bevy::shape::Aabb3d;
 use std::str::FromStr;
 use umbrage::language::ParseError;
 use umbrage::visibility::Filter;

@@ -4,12 +4,12 @@ mod common;
 
 use bevy::camera::RenderTarget;
 use bevy::ecs::system::RunSystemOnce;
-use bevy::light::cascade::Cascades;
 use bevy::light::CascadeShadowConfig;
-use bevy::shape::Aabb3d;
+use bevy::light::cascade::Cascades;
 use bevy::prelude::*;
 use bevy::render::render_resource::TextureFormat;
 use bevy::shader::{ShaderImport, Source};
+use bevy::shape::Aabb3d;
 use bevy_umbrage::prelude::*;
 use common::{loaded, lookup};
 
@@ -237,9 +237,8 @@ fn several_cameras_share_the_ends_of_cascades() {
 fn bad_input_leaves_bevys_cascades() {
     let shadows = || "adaptive+z4".parse::<UmbrageShadows>().unwrap();
     let ok = Transform::from_xyz(0.0, 2.0, 0.0);
-    let perspective = |near, far| {
-        Projection::Perspective(PerspectiveProjection { near, far, ..default() })
-    };
+    let perspective =
+        |near, far| Projection::Perspective(PerspectiveProjection { near, far, ..default() });
     let cases: [(&str, UmbrageShadows, Transform, Option<Projection>); 7] = [
         ("NaN distance", shadows().with_distance(f32::NAN), ok, None),
         ("negative distance", shadows().with_distance(-3.0), ok, None),

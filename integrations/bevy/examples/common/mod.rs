@@ -261,7 +261,9 @@ fn title(
     status: Res<UmbrageStatus>,
     diagnostics: Res<DiagnosticsStore>,
 ) {
-    let fps = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS).and_then(|fps| fps.smoothed());
+    let fps = diagnostics
+        .get(&FrameTimeDiagnosticsPlugin::FPS)
+        .and_then(bevy::diagnostic::Diagnostic::smoothed);
     let lookup = match &status.lookup {
         Lookup::Waiting => "waiting",
         Lookup::Umbrage => "on",

@@ -8,6 +8,7 @@ use bevy::prelude::*;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::json::validation::{Error as Flaw, Validate};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
 
 /// What was added to the app.
@@ -51,16 +52,18 @@ fn add(harness: &mut Harness, bytes: &[u8], scale: f32) -> Result<Added, String>
         let place = place(&node)?;
         let entity = world.spawn((place, Visibility::default(), ChildOf(parent))).id();
         if let Some(mesh) = node.mesh() {
-            if !meshes.contains_key(&mesh.index()) {
-                let parts = parts(&mesh, blob)?.into_iter().map(|(part, count)| {
-                    (harness.app().world_mut().resource_mut::<Assets<Mesh>>().add(part), count)
-                });
-                meshes.insert(mesh.index(), parts.collect());
-            }
-            for (part, count) in &meshes[&mesh.index()] {
+            let known = match meshes.entry(mesh.index()) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    let mut assets = harness.app().world_mut().resource_mut::<Assets<Mesh>>();
+                    let parts = parts(&mesh, blob)?.into_iter();
+                    new.insert(parts.map(|(part, count)| (assets.add(part), count)).collect())
+                }
+            };
+            for (part, count) in known {
                 harness.add_instance(part.clone(), Transform::IDENTITY, Some(entity));
                 added.instances += 1;
-                added.triangles += count;
+                added.triangles += *count;
             }
         }
         open.extend(node.children().map(|child| (child, entity)));

@@ -64,7 +64,7 @@ pub(crate) enum Umbrage {
     /// With Bevy's cascades, and the plugin's lookup.
     Lookup,
     /// With planned cascades, and the plugin's lookup.
-    Planned(UmbrageShadows),
+    Planned(Box<UmbrageShadows>),
 }
 
 /// A perspective view. Lengths are in metres.
@@ -215,7 +215,7 @@ pub(crate) fn umbrage(text: &str) -> Result<(Umbrage, Option<u32>), String> {
     }
     let technique: Technique = text.parse().map_err(|e| format!("{e}"))?;
     let shadows = UmbrageShadows::new(technique).map_err(|e| format!("`{text}`: {e}"))?;
-    let planned = Umbrage::Planned(shadows.with_receivers(Receivers::Meshes));
+    let planned = Umbrage::Planned(Box::new(shadows.with_receivers(Receivers::Meshes)));
     if !text.contains('@') {
         return Ok((planned, None));
     }
@@ -345,7 +345,7 @@ impl Harness {
             ))
             .id();
         if let Umbrage::Planned(shadows) = &setup.umbrage {
-            world.entity_mut(light).insert(shadows.clone());
+            world.entity_mut(light).insert((**shadows).clone());
         }
         Ok(Self {
             app,
@@ -703,7 +703,7 @@ fn place(columns: [f64; 12]) -> Option<Transform> {
 /// The triangles of a mesh of `umbrage-scene`.
 pub(crate) fn mesh_of(mesh: &umbrage_scene::Mesh) -> Mesh {
     let vectors = |v: &[bevy_umbrage::umbrage::glam::Vec3]| -> Vec<[f32; 3]> {
-        v.iter().map(|v| v.to_array()).collect()
+        v.iter().map(bevy_umbrage::umbrage::glam::Vec3::to_array).collect()
     };
     triangles(
         vectors(&mesh.positions),
@@ -781,7 +781,7 @@ fn new_app(uses_umbrage: bool, add: impl FnOnce(&mut App)) -> Result<App, String
 }
 
 fn render_world(app: &App) -> Result<&World, String> {
-    app.get_sub_app(RenderApp).map(|app| app.world()).ok_or("Bevy has no renderer".into())
+    app.get_sub_app(RenderApp).map(SubApp::world).ok_or("Bevy has no renderer".into())
 }
 
 fn device(app: &App) -> Result<&RenderDevice, String> {

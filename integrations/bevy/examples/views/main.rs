@@ -284,7 +284,7 @@ impl Run {
         title: &str,
         found: &[(&str, Vec<Found>)],
         off: Option<usize>,
-        columns: &[fn(&Found) -> Option<f64>],
+        columns: &[Column],
     ) {
         println!("\n{title}\n");
         self.head();
@@ -295,10 +295,10 @@ impl Run {
             let cell = |f: &Found| join(columns.iter().map(|c| percent(c(f))).collect(), " / ");
             println!("| {view} | {} |", join(row.iter().map(cell).collect(), " | "));
         }
-        let mean_of = |column: fn(&Found) -> Option<f64>, variant: usize| {
+        let mean_of = |column: Column, variant: usize| {
             mean(found.iter().map(|(_, row)| column(&row[variant]).map(|s| s.max(LEAST_SHARE))))
         };
-        let line = |name: &str, value: &dyn Fn(fn(&Found) -> Option<f64>, usize) -> String| {
+        let line = |name: &str, value: &dyn Fn(Column, usize) -> String| {
             let cell = |v| join(columns.iter().map(|&c| value(c, v)).collect(), " / ");
             let cells = (0..self.variants.len()).map(cell).collect();
             println!("| {name} | {} |", join(cells, " | "));
@@ -314,6 +314,9 @@ impl Run {
         }
     }
 }
+
+/// A share that a table shows of what was found.
+type Column = fn(&Found) -> Option<f64>;
 
 /// The geometric mean of values above 0; `None` if any is missing.
 fn mean(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {

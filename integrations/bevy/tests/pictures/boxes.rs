@@ -60,7 +60,7 @@ pub fn setup(umbrage: Umbrage) -> Setup {
 }
 
 pub fn planned(text: &str) -> Umbrage {
-    Umbrage::Planned(text.parse().expect("a technique"))
+    Umbrage::Planned(Box::new(text.parse().expect("a technique")))
 }
 
 /// Adds boxes in white.

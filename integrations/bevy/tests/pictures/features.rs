@@ -2,18 +2,17 @@
 
 use crate::boxes::{BLOCKS, SUN, add, draw, errors, planned, setup, truth};
 use crate::harness::{Harness, Setup, Umbrage};
+use bevy::asset::uuid_handle;
+use bevy::camera::RenderTarget;
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::core_pipeline::prepass::{DepthPrepass, MotionVectorPrepass, NormalPrepass};
 use bevy::light::ShadowFilteringMethod;
-use bevy::asset::uuid_handle;
-use bevy::camera::RenderTarget;
 use bevy::mesh::VertexAttributeValues;
 use bevy::mesh::morph::{MeshMorphWeights, MorphAttributes};
 use bevy::mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes};
 use bevy::prelude::*;
 use bevy::render::render_resource::{AsBindGroup, Face, TextureFormat};
 use bevy::shader::{ShaderImport, ShaderRef};
-use bevy_umbrage::UmbrageShadows;
 use umbrage_testing::needs;
 
 fn harness(setup: &Setup) -> Harness {
@@ -47,7 +46,7 @@ fn depth_shaders_know_warps() {
 fn variants() -> [(&'static str, Umbrage); 4] {
     [
         ("lookup", Umbrage::Lookup),
-        ("stable", Umbrage::Planned(UmbrageShadows::default())),
+        ("stable", Umbrage::Planned(Box::default())),
         ("adaptive+z4", planned("adaptive+z4")),
         ("lispsm", planned("lispsm")),
     ]
@@ -111,7 +110,10 @@ fn as_the_plain_scene(name: &str, setup: &Setup, change: impl Fn(&mut Harness)) 
 }
 
 /// Replaces the material of all meshes.
-fn with_material(harness: &mut Harness, material: impl FnOnce(StandardMaterial) -> StandardMaterial) {
+fn with_material(
+    harness: &mut Harness,
+    material: impl FnOnce(StandardMaterial) -> StandardMaterial,
+) {
     let white = harness.white();
     let mut materials = harness.app().world_mut().resource_mut::<Assets<StandardMaterial>>();
     let changed = material(materials.get(&white).expect("white").clone());

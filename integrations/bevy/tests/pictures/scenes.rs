@@ -59,7 +59,7 @@ impl Case {
         let tracer = Tracer::new(scene).expect("a scene").opaque(true);
         let view = View::new(&tracer, camera.expect("a camera"), light, 1).expect("a view");
         let truth = |sample: &Sample| {
-            view.counts(sample.is_facing, sample.depth).then(|| view.truth(sample) as f32)
+            view.counts(sample.is_facing, sample.depth).then(|| view.truth(sample))
         };
         let mut pixels = Vec::new();
         for rows in view.bands() {
@@ -143,11 +143,11 @@ fn built_in_scenes() {
             (ShadowFilteringMethod::Gaussian, [0.6, 1.0]),
         ] {
             let bevy = case.errors(&scene, &truth, ("off", Umbrage::Off), filter);
-            let adaptive = "adaptive+z4".parse().expect("a technique");
+            let adaptive: UmbrageShadows = "adaptive+z4".parse().expect("a technique");
             for (name, umbrage, share) in [
                 ("lookup", Umbrage::Lookup, most),
-                ("stable", Umbrage::Planned(UmbrageShadows::default()), most),
-                ("adaptive", Umbrage::Planned(adaptive), most.map(|m| 0.7 * m)),
+                ("stable", Umbrage::Planned(Box::default()), most),
+                ("adaptive", Umbrage::Planned(Box::new(adaptive.clone())), most.map(|m| 0.7 * m)),
             ] {
                 let ours = case.errors(&scene, &truth, (name, umbrage), filter);
                 for i in 0..2 {
