@@ -4,7 +4,8 @@ use bevy::prelude::*;
 
 /// Shows how the maps of directional lights lie on what they light, in place of the light's own
 /// colour. A change compiles Bevy's shaders anew, which takes a moment.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Resource, Clone, Debug, Default, PartialEq)]
 pub enum UmbrageDebug {
     /// Nothing is shown.
     #[default]

@@ -43,7 +43,10 @@ pub struct UmbragePlugin;
 
 impl Plugin for UmbragePlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<UmbrageDebug>()
+        app.register_type::<UmbrageShadows>()
+            .register_type::<UmbrageDebug>()
+            .register_type::<UmbrageEnabled>()
+            .init_resource::<UmbrageDebug>()
             .init_resource::<UmbrageEnabled>()
             .init_resource::<UmbrageStatus>();
     }

@@ -12,7 +12,8 @@ use std::time::Duration;
 
 /// Turns everything that this crate does on or off, at run time. A change compiles Bevy's shaders
 /// anew, which takes a moment.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Resource, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
+#[reflect(Resource, Clone, Debug, Default, PartialEq)]
 pub struct UmbrageEnabled(pub bool);
 
 impl Default for UmbrageEnabled {

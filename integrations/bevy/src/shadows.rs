@@ -10,7 +10,7 @@ use umbrage::{Cover, Faces, Partition, Splits, Technique, Warp};
 
 /// Asks for planned cascades for a directional light, in place of Bevy's own.
 ///
-/// The default, `uniform(stable)+z4(practical=0.75)`, does not shimmer however the camera moves and
+/// The default, `uniform(stable)+z4(practical=0.65)`, does not shimmer however the camera moves and
 /// turns. More of the error goes with a technique that is fitted to what the camera sees, such as
 /// `adaptive+z4`; its shadows shimmer while the camera moves. A technique is written as text, or is a value of
 /// [`umbrage::Technique`]:
@@ -31,7 +31,9 @@ use umbrage::{Cover, Faces, Partition, Splits, Technique, Warp};
 /// While a light has this component, the plan writes its
 /// [`CascadeShadowConfig`](bevy::light::CascadeShadowConfig). The light gets its own one back when
 /// the component is removed.
-#[derive(Component, Clone, Debug, PartialEq)]
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
 pub struct UmbrageShadows {
     technique: Technique,
     distance: Option<f32>,
@@ -99,7 +101,7 @@ const OVERLAP: f64 = 0.1;
 /// Slices between even and self-similar ones. Stable maps do not know what is seen. Self-similar
 /// slices from Bevy's near plane, 0.1 m by default, would spend most of the maps on the first metres,
 /// where there is seldom anything to see.
-const BLEND: f64 = 0.75;
+const BLEND: f64 = 0.65;
 
 impl Default for UmbrageShadows {
     fn default() -> Self {
@@ -221,7 +223,7 @@ mod tests {
         }
         let shadows: UmbrageShadows = "adaptive+z4(overlap=0.3)".parse().unwrap();
         assert_eq!(shadows.technique().partition.overlap, 0.3);
-        assert_eq!("uniform(stable)+z4(practical=0.75)".parse(), Ok(UmbrageShadows::default()));
+        assert_eq!("uniform(stable)+z4(practical=0.65)".parse(), Ok(UmbrageShadows::default()));
     }
 
     #[test]
