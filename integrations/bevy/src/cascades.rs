@@ -14,11 +14,12 @@ use bevy::light::{
 use bevy::math::Vec3A;
 use bevy::platform::collections::HashSet;
 use bevy::platform::collections::hash_map::Entry;
+use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::render::occlusion_culling::OcclusionCulling;
 use bevy::render::render_resource::WgpuFeatures;
 use bevy::render::renderer::RenderDevice;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use umbrage::glam::{DMat4, DVec2, DVec3};
 use umbrage::visibility::Filter;
 use umbrage::{

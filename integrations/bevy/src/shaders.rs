@@ -399,3 +399,45 @@ fn change_shaders(
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "fn other(a: f32) -> f32 { return a; }\n\
+                        fn sum(first: vec2<f32>, second: array<f32, 2>) -> f32 {\n    \
+                        if (first.x > 0.0) { return 1.0; }\n    return second[0];\n}\n\
+                        const END: u32 = 1u;\n";
+
+    #[test]
+    fn functions_are_found_with_their_bodies() {
+        let found = function(TEXT, "sum").unwrap();
+        assert!(TEXT[found.whole.clone()].starts_with("fn sum("));
+        assert!(TEXT[found.whole].ends_with("return second[0];\n}"));
+        assert!(TEXT[found.body.clone()].starts_with("{\n"));
+        let head = &TEXT[function(TEXT, "sum").unwrap().whole.start..found.body.start];
+        assert_eq!(parameters(head), ["first", "second"]);
+    }
+
+    #[test]
+    fn functions_that_are_not_there_once() {
+        assert!(function(TEXT, "su").is_err_and(|e| e.contains("su is not there once")));
+        assert!(function(&TEXT.repeat(2), "sum").is_err());
+        assert!(function("fn sum(a: f32) { {", "sum").is_err_and(|e| e.contains("does not end")));
+        assert!(function("", "sum").is_err());
+    }
+
+    #[test]
+    fn fingerprints_ignore_white_space_alone() {
+        assert_eq!(fingerprint("let a = 1;\n    let b = 2;"), fingerprint("let a = 1; let b = 2;"));
+        assert_ne!(fingerprint("let a = 1;"), fingerprint("let a = 2;"));
+        assert_ne!(fingerprint("let ab;"), fingerprint("let a b;"));
+    }
+
+    #[test]
+    fn every_shader_is_changed_for_one_purpose() {
+        for (i, changed) in CHANGED.iter().enumerate() {
+            assert!(CHANGED[..i].iter().all(|other| other.path != changed.path));
+        }
+    }
+}
