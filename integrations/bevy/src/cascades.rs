@@ -253,7 +253,8 @@ impl Asked {
             Receivers::View => {}
             Receivers::Box(aabb) => {
                 let point = |p: Vec3A| DVec3::from_array(p.to_array().map(f64::from));
-                bounds.receivers = Some(umbrage::Aabb::new(point(aabb.min), point(aabb.max)));
+                let (min, max) = (point(aabb.min), point(aabb.max));
+                bounds.receivers = Some(umbrage::Aabb { min, max });
             }
             Receivers::Meshes => {
                 let boxes = boxes.or_insert_with(|| Boxes::of(&input.meshes, visible));
