@@ -328,7 +328,14 @@ fn write(cascades: &mut Vec<Cascade>, maps: &[ShadowMap]) {
         if map.is_empty() {
             continue;
         }
-        let clip_from_world = CLIP_FROM_SHADOW * map.shadow_from_world();
+        let mut clip_from_world = CLIP_FROM_SHADOW * map.shadow_from_world();
+        // Bevy leaves out the back faces of casters, and must find those that it found in its own
+        // cascade.
+        let is_mirrored = |determinant: f64| determinant.is_sign_negative();
+        let bevys = double(cascade.clip_from_world).determinant();
+        if is_mirrored(clip_from_world.determinant()) != is_mirrored(bevys) {
+            clip_from_world = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * clip_from_world;
+        }
         // Bevy's depth passes use `clip_from_world`; the other two agree with it.
         cascade.clip_from_cascade = single(clip_from_world * double(cascade.world_from_cascade));
         cascade.clip_from_world = single(clip_from_world);

@@ -321,3 +321,27 @@ fn an_app_without_a_renderer_is_left_alone() {
     app.update();
     assert_eq!(*lookup(&app), Lookup::Waiting);
 }
+
+#[test]
+fn planned_cascades_see_the_same_side_of_triangles_as_bevys() {
+    let mut app = loaded();
+    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::new(9.0, 3.0, 9.0));
+    app.world_mut().spawn((Mesh3d(mesh), Transform::from_xyz(0.0, 0.0, -8.0)));
+    let view = spawn_camera(&mut app, Transform::from_xyz(0.0, 2.0, 0.0));
+    let light = spawn_sun(&mut app, UmbrageShadows::default());
+    let mut sides = |shadows: Option<&str>| {
+        let mut light_mut = app.world_mut().entity_mut(light);
+        match shadows {
+            Some(text) => light_mut.insert(text.parse::<UmbrageShadows>().unwrap()),
+            None => light_mut.remove::<UmbrageShadows>(),
+        };
+        app.update();
+        app.update();
+        let signs = cascades(&app, light, view).iter().map(|c| c.clip_from_world.determinant());
+        signs.map(f32::signum).collect::<Vec<_>>()
+    };
+    let bevys = sides(None);
+    for text in ["uniform+z4", "uniform(stable)+z4", "adaptive+z4", "lispsm", "psm", "tsm"] {
+        assert!(sides(Some(text)).iter().all(|sign| *sign == bevys[0]), "{text}");
+    }
+}

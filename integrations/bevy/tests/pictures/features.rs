@@ -168,6 +168,21 @@ fn alpha_masks() {
 
 #[needs(gpu)]
 #[test]
+fn single_sided_materials() {
+    // Bevy's default material: back faces are neither seen nor drawn into maps.
+    for text in ["uniform(stable)+z4", "adaptive+z4", "lispsm", "psm"] {
+        as_the_plain_scene(text, &setup(planned(text)), |harness| {
+            with_material(harness, |white| StandardMaterial {
+                double_sided: false,
+                cull_mode: Some(Face::Back),
+                ..white
+            });
+        });
+    }
+}
+
+#[needs(gpu)]
+#[test]
 fn transparent_receivers() {
     let setup = setup(planned("adaptive+z4"));
     as_the_plain_scene("transparent", &setup, |harness| {
