@@ -156,3 +156,44 @@ proptest! {
         }
     }
 }
+
+/// Fewer parts are served by larger boxes, down to the one around all.
+#[test]
+fn fewer_parts_leave_more_space() {
+    let camera = umbrage::Camera::look_at(umbrage::LookAt {
+        eye: DVec3::new(0.0, 2.0, 0.0),
+        target: DVec3::new(0.0, 1.0, -10.0),
+        up: DVec3::Y,
+        fov_y_rad: 1.0,
+        near: 0.1,
+        far: 100.0,
+        image: [640, 360],
+    })
+    .unwrap();
+    let light = Light::Directional { direction: DVec3::new(0.4, -1.0, 0.3) };
+    let place = |i: u32| DVec3::new(f64::from(i * 7 % 20) - 10.0, 0.0, -2.0 - f64::from(i));
+    let boxes: Vec<Aabb> =
+        (0..60).map(|i| Aabb::new(place(i), place(i) + DVec3::new(0.5, 3.0, 0.5))).collect();
+    let tree = tree(&boxes);
+    let bounds =
+        Bounds { receivers: Some(tree.bounds()), receiver_parts: Some(&tree), ..Bounds::default() };
+    let mut planner = planner();
+    let mut storage = |planner: &mut umbrage::Planner| {
+        let technique = Technique::default();
+        planner.plan(&camera, &[light], &bounds, &technique).unwrap().storage_factor()
+    };
+    let all = storage(&mut planner);
+    let mut last = all;
+    for parts in [8, 1] {
+        planner.set_most_parts(parts).unwrap();
+        let fewer = storage(&mut planner);
+        assert!(fewer > last, "{parts} parts: {fewer}, more parts: {last}");
+        last = fewer;
+    }
+    planner.set_most_parts(umbrage::Planner::MOST_PARTS).unwrap();
+    assert_eq!(storage(&mut planner), all);
+    for parts in [0, umbrage::Planner::MOST_PARTS + 1] {
+        let error = planner.set_most_parts(parts).unwrap_err().to_string();
+        assert!(error.starts_with("most_parts"), "{error}");
+    }
+}
