@@ -1,19 +1,18 @@
 //! The system that plans cascades and writes them in place of Bevy's.
 
+use crate::convert::{double, single, vector};
 use crate::receivers::{Boxes, Meshes};
 use crate::shaders::{Lookup, UmbrageEnabled, UmbrageStatus};
 use crate::shadows::{Receivers, UmbrageShadows};
 use bevy::camera::visibility::{VisibilitySystems, VisibleEntities};
-use bevy::ecs::entity::{EntityHash, EntityHashMap};
+use bevy::ecs::entity::EntityHashMap;
 use bevy::ecs::system::SystemParam;
 use bevy::light::cascade::{Cascade, Cascades};
 use bevy::light::{
     CascadeShadowConfig, DirectionalLightShadowMap, ShadowFilteringMethod, SimulationLightSystems,
     VolumetricFog,
 };
-use bevy::math::Vec3A;
 use bevy::platform::collections::HashSet;
-use bevy::platform::collections::hash_map::Entry;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use bevy::render::occlusion_culling::OcclusionCulling;
@@ -152,11 +151,7 @@ fn plan_cascades(
     let can_warp = status.clamps_warped_depths || input.device.as_deref().is_some_and(has_clamp);
     kept.planners.retain(|light, _| lights.contains(*light));
     kept.boxes.retain(|view, _| input.views.contains(*view));
-    for (view, boxes) in &mut kept.boxes {
-        if let Ok((.., visible, _, _)) = input.views.get(*view) {
-            boxes.find(&input.meshes, visible);
-        }
-    }
+    kept.boxes.values_mut().for_each(Boxes::forget);
 
     for (light, transform, source, shadows, mut config, mut cascades, own, is_culled) in &mut lights
     {
@@ -183,9 +178,7 @@ fn plan_cascades(
             share_splits(&mut technique, &user, distance);
         }
         let asked = Asked {
-            sun: Light::Directional {
-                direction: DVec3::from_array(transform.forward().to_array().map(f64::from)),
-            },
+            sun: Light::Directional { direction: vector(transform.forward().to_array()) },
             technique,
             distance,
             receivers: shadows.receivers(),
@@ -196,7 +189,7 @@ fn plan_cascades(
         let mut written = None;
         for (&view, cascades) in &mut cascades.cascades {
             let planner = planners.entry(view).or_insert_with(planner);
-            let boxes = kept.boxes.entry(view);
+            let boxes = kept.boxes.entry(view).or_default();
             match asked.plan(view, planner, boxes, &input) {
                 None => {}
                 Some(Ok(plan)) => {
@@ -250,7 +243,7 @@ impl Asked {
         &self,
         view: Entity,
         planner: &'a mut Planner,
-        boxes: Entry<'_, Entity, Boxes, EntityHash>,
+        boxes: &mut Boxes,
         input: &Input,
     ) -> Option<Result<&'a Plan, umbrage::Error>> {
         let (pose, projection, camera, visible, filter, sees_fog) = input.views.get(view).ok()?;
@@ -262,13 +255,11 @@ impl Asked {
             _ if sees_fog || technique.cover == Cover::Stable => {}
             Receivers::View => {}
             Receivers::Box(aabb) => {
-                let point = |p: Vec3A| DVec3::from_array(p.to_array().map(f64::from));
-                let (min, max) = (point(aabb.min), point(aabb.max));
+                let [min, max] = [aabb.min, aabb.max].map(|corner| vector(corner.to_array()));
                 bounds.receivers = Some(umbrage::Aabb { min, max });
             }
             Receivers::Meshes => {
-                let boxes = boxes.or_insert_with(|| Boxes::of(&input.meshes, visible));
-                bounds.receiver_parts = boxes.tree();
+                bounds.receiver_parts = boxes.tree(&input.meshes, visible);
                 bounds.receivers = bounds.receiver_parts.map(BoxTree::bounds);
             }
         }
@@ -292,7 +283,8 @@ fn filter_of(filter: Option<&ShadowFilteringMethod>) -> Filter {
 }
 
 /// All views of a light share the ends of its cascades. Slices that follow from what one view sees
-/// do not fit the others, so all take slices as Bevy divides them.
+/// do not fit the others, so all take slices as Bevy divides them. `CascadeShadowConfigBuilder` has
+/// the same formula, but panics at a bad distance.
 fn share_splits(technique: &mut Technique, user: &CascadeShadowConfig, distance: f32) {
     let slices = technique.partition.slices as usize;
     let first = user.bounds.first().copied().filter(|first| *first < distance);
@@ -375,12 +367,4 @@ fn largest_texel(map: &ShadowMap) -> f64 {
         .iter()
         .flat_map(|&at| [side(at, DVec2::X * step_s), side(at, DVec2::Y * step_t)])
         .fold(0.0, f64::max)
-}
-
-fn double(m: Mat4) -> DMat4 {
-    DMat4::from_cols_array(&m.to_cols_array().map(f64::from))
-}
-
-fn single(m: DMat4) -> Mat4 {
-    Mat4::from_cols_array(&m.to_cols_array().map(|x| x as f32))
 }

@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 
 mod cascades;
+mod convert;
 mod debug;
 mod receivers;
 mod shaders;

@@ -1,14 +1,13 @@
 //! The boxes around the receivers that a camera sees, from Bevy's visible meshes.
 
+use crate::convert::vector;
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{NoCpuCulling, NoFrustumCulling, VisibleEntities};
 use bevy::ecs::system::SystemParam;
 use bevy::light::NotShadowReceiver;
-use bevy::math::Vec3A;
 use bevy::prelude::*;
 use std::any::TypeId;
 use umbrage::BoxTree;
-use umbrage::glam::DVec3;
 
 type Mesh = (&'static Aabb, &'static GlobalTransform, Has<NoFrustumCulling>);
 
@@ -27,41 +26,44 @@ pub(crate) struct Boxes {
     boxes: Vec<umbrage::Aabb>,
     last: Vec<umbrage::Aabb>,
     tree: BoxTree,
+    /// Whether they were looked for in this frame.
+    is_found: bool,
+    /// Whether all receivers have boxes, and there are some.
     is_known: bool,
 }
 
 impl Boxes {
-    /// The boxes that a camera sees first.
-    pub(crate) fn of(meshes: &Meshes, visible: &VisibleEntities) -> Self {
-        let mut boxes = Self::default();
-        boxes.find(meshes, visible);
-        boxes
+    /// Begins a frame.
+    pub(crate) fn forget(&mut self) {
+        self.is_found = false;
     }
 
-    /// Finds the boxes around the receivers that a camera may see.
-    pub(crate) fn find(&mut self, meshes: &Meshes, visible: &VisibleEntities) {
+    /// A tree of the boxes around the receivers that a camera may see; `None` if a receiver has no
+    /// box or if there are no receivers.
+    pub(crate) fn tree(&mut self, meshes: &Meshes, visible: &VisibleEntities) -> Option<&BoxTree> {
+        if !self.is_found {
+            self.is_found = true;
+            self.is_known = self.find(meshes, visible).is_some();
+        }
+        self.is_known.then_some(&self.tree)
+    }
+
+    fn find(&mut self, meshes: &Meshes, visible: &VisibleEntities) -> Option<()> {
         self.boxes.clear();
         let seen = visible.entities.get(&TypeId::of::<Mesh3d>()).map_or(&[][..], Vec::as_slice);
         for entity in seen.iter().copied().chain(&meshes.not_culled_here) {
             match meshes.receivers.get(entity) {
                 Ok((aabb, transform, false)) => self.boxes.push(world_box(aabb, transform)),
                 _ if meshes.others.contains(entity) => {}
-                _ => {
-                    self.is_known = false;
-                    return;
-                }
+                _ => return None,
             }
         }
-        self.is_known = !self.boxes.is_empty();
-        if self.is_known && self.boxes != self.last {
-            self.is_known = self.tree.set(&self.boxes).is_ok();
+        if self.boxes != self.last {
+            // A tree that refuses boxes keeps those that it has.
+            self.tree.set(&self.boxes).ok()?;
             self.last.clone_from(&self.boxes);
         }
-    }
-
-    /// A tree of the boxes found; `None` if a receiver has no box or if there are no receivers.
-    pub(crate) fn tree(&self) -> Option<&BoxTree> {
-        self.is_known.then_some(&self.tree)
+        (!self.boxes.is_empty()).then_some(())
     }
 }
 
@@ -72,6 +74,6 @@ fn world_box(aabb: &Aabb, transform: &GlobalTransform) -> umbrage::Aabb {
     let half = axes.x_axis.abs() * aabb.half_extents.x
         + axes.y_axis.abs() * aabb.half_extents.y
         + axes.z_axis.abs() * aabb.half_extents.z;
-    let point = |p: Vec3A| DVec3::from_array(p.to_array().map(f64::from));
-    umbrage::Aabb::new(point(center - half), point(center + half))
+    let [a, b] = [center - half, center + half].map(|corner| vector(corner.to_array()));
+    umbrage::Aabb::new(a, b)
 }

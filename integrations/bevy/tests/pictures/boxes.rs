@@ -49,6 +49,13 @@ pub const VIEW: ViewPoint = ViewPoint {
 
 pub const SUN: Vec3 = Vec3::new(-0.55, -0.7, -0.35);
 
+/// Bevy's filters.
+pub const FILTERS: [ShadowFilteringMethod; 3] = [
+    ShadowFilteringMethod::Hardware2x2,
+    ShadowFilteringMethod::Gaussian,
+    ShadowFilteringMethod::Temporal,
+];
+
 /// A small picture, because drivers in software draw it.
 pub fn setup(umbrage: Umbrage) -> Setup {
     let mut setup = Setup::new(VIEW, SUN).expect("a view");

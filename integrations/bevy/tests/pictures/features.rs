@@ -1,6 +1,6 @@
 //! Shadows of the sun with each of Bevy's features, against rays and against the plain picture.
 
-use crate::boxes::{BLOCKS, SUN, add, draw, errors, planned, setup, truth};
+use crate::boxes::{BLOCKS, FILTERS, SUN, add, draw, errors, planned, setup, truth};
 use crate::harness::{Harness, Setup, Umbrage};
 use bevy::asset::uuid_handle;
 use bevy::camera::RenderTarget;
@@ -51,12 +51,6 @@ fn variants() -> [(&'static str, Umbrage); 4] {
         ("lispsm", planned("lispsm")),
     ]
 }
-
-const FILTERS: [ShadowFilteringMethod; 3] = [
-    ShadowFilteringMethod::Hardware2x2,
-    ShadowFilteringMethod::Gaussian,
-    ShadowFilteringMethod::Temporal,
-];
 
 #[needs(gpu)]
 #[test]

@@ -1,19 +1,13 @@
 //! Shadows of spot and point lights, against rays.
 
-use crate::boxes::{BLOCKS, add, errors, setup, truth};
+use crate::boxes::{BLOCKS, FILTERS, add, errors, setup, truth};
 use crate::harness::{Harness, Setup, Umbrage};
-use bevy::light::{PointLightShadowMap, ShadowFilteringMethod};
+use bevy::light::PointLightShadowMap;
 use bevy::prelude::*;
 use umbrage_testing::needs;
 
 const LAMP: Vec3 = Vec3::new(2.2, 3.2, 1.7);
 const POWER: f32 = 3e4;
-
-const FILTERS: [ShadowFilteringMethod; 3] = [
-    ShadowFilteringMethod::Hardware2x2,
-    ShadowFilteringMethod::Gaussian,
-    ShadowFilteringMethod::Temporal,
-];
 
 /// The errors under one lamp in place of the sun.
 fn lamp_errors(
