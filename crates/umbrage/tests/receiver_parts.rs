@@ -178,7 +178,7 @@ fn fewer_parts_leave_more_space() {
     let bounds =
         Bounds { receivers: Some(tree.bounds()), receiver_parts: Some(&tree), ..Bounds::default() };
     let mut planner = planner();
-    let mut storage = |planner: &mut umbrage::Planner| {
+    let storage = |planner: &mut umbrage::Planner| {
         let technique = Technique::default();
         planner.plan(&camera, &[light], &bounds, &technique).unwrap().storage_factor()
     };
