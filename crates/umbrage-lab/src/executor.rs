@@ -37,6 +37,11 @@ impl<'a> RenderScene<'a> {
         &self.tracer
     }
 
+    /// Returns the GPU and the scene's buffers on it, if there is a GPU.
+    pub fn on_gpu(&self) -> Option<(&'a Gpu, &SceneBuffers<'a>)> {
+        self.gpu.as_ref().map(|(gpu, buffers)| (*gpu, buffers))
+    }
+
     /// Returns what a camera sees, if the maps are fitted to that. A GPU draws the picture and
     /// reduces its depths; without one, rays find them.
     ///
@@ -45,15 +50,7 @@ impl<'a> RenderScene<'a> {
     pub fn seen(&self, receivers: &Receivers, camera: &Camera) -> Result<Option<SeenTiles>, Error> {
         match &self.gpu {
             Some((gpu, buffers)) if receivers.are_seen() && gpu.support().compute => {
-                let mut readback = SeenReadback::new(gpu.device(), &gpu.support())
-                    .map_err(umbrage_render::Error::from)?;
-                let mut renderer = Renderer::new(gpu, buffers, &ShadowOptions::default())?;
-                let target = FrameTarget::new(gpu, camera.image()).about(Field::Size)?;
-                // The light does not matter for depths.
-                let light = Light::Directional { direction: DVec3::NEG_Y };
-                let shading = Shading { camera, light: &light, light_index: 0 };
-                renderer.frame(&shading, &target, None)?;
-                Ok(renderer.seen(camera, &target, &mut readback)?)
+                Scout::new(gpu, buffers)?.seen(camera)
             }
             _ => receivers.seen(&self.tracer, camera),
         }
@@ -96,6 +93,46 @@ impl<'a> RenderScene<'a> {
     }
 }
 
+/// Finds on a GPU what cameras see, for maps that are fitted to that.
+pub struct Scout<'a> {
+    gpu: &'a Gpu,
+    renderer: Renderer<'a, 'a>,
+    target: Option<FrameTarget>,
+    readback: SeenReadback,
+}
+
+impl<'a> Scout<'a> {
+    /// Makes a scout for a scene.
+    ///
+    /// # Errors
+    /// An error if the GPU has no compute shaders.
+    pub fn new(gpu: &'a Gpu, buffers: &'a SceneBuffers<'a>) -> Result<Self, Error> {
+        let readback = SeenReadback::new(gpu.device(), &gpu.support())
+            .map_err(umbrage_render::Error::from)?;
+        let renderer = Renderer::new(gpu, buffers, &ShadowOptions::default())?;
+        Ok(Self { gpu, renderer, target: None, readback })
+    }
+
+    /// Draws the picture of a camera, reduces its depths and waits for them.
+    ///
+    /// # Errors
+    /// An error if the GPU fails, or if it cannot hold the picture.
+    pub fn seen(&mut self, camera: &Camera) -> Result<Option<SeenTiles>, Error> {
+        let Self { gpu, renderer, target, readback } = self;
+        let [width, height] = camera.image();
+        target.take_if(|t| [t.color().width(), t.color().height()] != [width, height]);
+        let target = match target {
+            Some(target) => target,
+            None => target.insert(FrameTarget::new(gpu, [width, height]).about(Field::Size)?),
+        };
+        // The light does not matter for depths.
+        let light = Light::Directional { direction: DVec3::NEG_Y };
+        let shading = Shading { camera, light: &light, light_index: 0 };
+        renderer.frame(&shading, target, None)?;
+        Ok(renderer.seen(camera, target, readback)?)
+    }
+}
+
 /// Renders a technique's shadow maps and looks them up.
 pub struct Executor<'a> {
     pub(crate) work: Work<'a>,
@@ -129,8 +166,9 @@ impl OnGpu<'_> {
     }
 }
 
-/// Returns the triangles that a plan's lamps lie in.
-fn edge_on(plan: &Plan, tracer: &Tracer<'_>) -> Vec<EdgeOn> {
+/// Returns the triangles that a plan's lamps lie in, which must be
+/// [left out](Renderer::leave_out) of their maps.
+pub fn edge_on(plan: &Plan, tracer: &Tracer<'_>) -> Vec<EdgeOn> {
     let lamps = plan.lights.iter().enumerate().filter_map(|(light, planned)| {
         let mut maps = plan.maps[planned.maps.clone()].iter();
         maps.find_map(|m| Some((light, m.apex? + m.origin)))

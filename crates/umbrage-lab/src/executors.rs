@@ -67,6 +67,11 @@ impl Executors {
         }
     }
 
+    /// Returns the executors of a program that has opened a GPU itself, such as one with a window.
+    pub fn with_gpu(gpu: Gpu) -> Self {
+        Self { choice: described(&gpu), gpu: Some(gpu) }
+    }
+
     /// Returns a line that tells the user what renders.
     pub fn choice(&self) -> &str {
         &self.choice
@@ -96,6 +101,6 @@ fn described(gpu: &Gpu) -> String {
 }
 
 /// Returns whether a GPU can render the technique. None can with the `log` warp, whose rows bend.
-pub(crate) fn runs_on_gpu(technique: &Technique) -> bool {
+pub fn runs_on_gpu(technique: &Technique) -> bool {
     technique.warp != Warp::Log
 }

@@ -42,11 +42,19 @@ pub fn plan_fading(
     bounds: &Bounds<'_>,
 ) -> Result<Plan, Error> {
     let mut planner = planner();
-    let receivers = bounds.receivers.unwrap_or(Aabb::EMPTY);
-    if receivers.corners().iter().any(|&corner| camera.depth(corner) > camera.far()) {
-        planner.set_fade(Planner::FADE).map_err(Error::Planning)?;
-    }
+    fade(&mut planner, camera, bounds)?;
     plan_with(&mut planner, technique, camera, light, bounds).cloned()
+}
+
+/// Makes a planner's shadows fade out before a camera's far distance if receivers go on beyond it,
+/// and end there without a fade if not.
+///
+/// # Errors
+/// None in practice: both settings are valid.
+pub fn fade(planner: &mut Planner, camera: &Camera, bounds: &Bounds<'_>) -> Result<(), Error> {
+    let receivers = bounds.receivers.unwrap_or(Aabb::EMPTY);
+    let goes_on = receivers.corners().iter().any(|&corner| camera.depth(corner) > camera.far());
+    planner.set_fade(if goes_on { Planner::FADE } else { 0.0 }).map_err(Error::Planning)
 }
 
 /// Plans a technique for one light with a planner, which keeps the plan.

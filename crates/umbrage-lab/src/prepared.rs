@@ -36,6 +36,21 @@ impl<'a> PreparedScene<'a> {
         Ok(Self { scene, executors, render, receivers, defaults, opaque })
     }
 
+    /// Returns the scene as it is rendered.
+    pub fn render(&self) -> &RenderScene<'a> {
+        &self.render
+    }
+
+    /// Returns the receivers of the scene's maps.
+    pub fn receivers(&self) -> &Receivers {
+        &self.receivers
+    }
+
+    /// Returns what the scene offers where a user leaves the view or the light open.
+    pub fn defaults(&self) -> &Defaults<'a> {
+        &self.defaults
+    }
+
     /// Returns the notices for readers of a report.
     pub(crate) fn notices(&self) -> Vec<String> {
         let mut notices: Vec<String> = self.scene.all_notices().into_iter().map(|n| n.0).collect();

@@ -38,7 +38,7 @@ pub struct Receivers {
 }
 
 /// Largest number of boxes around surfaces. More make planning slower and the maps hardly finer.
-const SURFACE_BOXES: usize = 256;
+pub const SURFACE_BOXES: usize = 256;
 
 impl Receivers {
     /// Returns the receivers that `fit` selects. Boxes around surfaces come from the tracer's tree.

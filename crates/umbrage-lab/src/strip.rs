@@ -232,6 +232,11 @@ impl Strip {
         }
     }
 
+    /// Returns the visibility of each sample, 0 (in shadow) to 1 (lit); 1 in the sky.
+    pub fn visibility(&self) -> &[f32] {
+        &self.visibility
+    }
+
     /// Returns each pixel's mean of a value over the samples that count; `None` if none does.
     pub(crate) fn means(&self, value: impl Fn(usize) -> f32) -> impl Iterator<Item = Option<f32>> {
         let n = self.samples_per_pixel;

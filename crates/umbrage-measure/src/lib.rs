@@ -35,7 +35,7 @@ pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_png};
 pub use image::{Image, Rgb};
 pub use legend::with_legend;
 pub use maps::{difference_map, error_map, grey, noise_map, partition_map, texel_map};
-pub use metrics::{ErrorPx, Metrics, Spots, measure, measure_error_px};
+pub use metrics::{ErrorPx, Metrics, Spots, Tally, measure, measure_error_px};
 pub use page::{
     FigureFile, FigureShown, FiguresPage, Page, SweepPage, quoted, write_figures, write_report,
     write_sweep,

@@ -66,30 +66,67 @@ pub fn measure(
     check_visibilities(truth, technique, counted)?;
     cosine.check_like(truth, "cosine")?;
     check_finite("cosine", cosine, counted)?;
-    let (mut n, mut false_light, mut false_shadow, mut sum) = (0_u64, 0_u64, 0_u64, 0.0);
+    let mut tally = Tally::default();
     let (mut weights, mut weighed) = (0.0, 0.0);
     let pixels = differences(truth, technique, counted).zip(cosine.pixels());
     for (difference, cosine) in pixels.filter_map(|(d, &c)| Some((d?, c.clamp(0.0, 1.0)))) {
-        n += 1;
+        tally.add_difference(difference);
         weights += f64::from(cosine);
         weighed += f64::from(cosine) * f64::from(difference.abs());
-        false_light += u64::from(difference > 0.5);
-        false_shadow += u64::from(difference < -0.5);
-        sum += f64::from(difference.abs());
     }
-    if n == 0 {
+    if tally.counted == 0 {
         return Ok(Metrics::default());
     }
-    let share = |count: u64| Some(count as f64 / n as f64);
     Ok(Metrics {
-        counted: n,
-        wrong_fraction: share(false_light + false_shadow),
-        false_light: share(false_light),
-        false_shadow: share(false_shadow),
-        mean_abs_error: Some(sum / n as f64),
+        counted: tally.counted,
+        wrong_fraction: tally.wrong_fraction(),
+        false_light: tally.share(tally.false_light),
+        false_shadow: tally.share(tally.false_shadow),
+        mean_abs_error: tally.mean_abs_error(),
         light_error: (weights > 0.0).then(|| weighed / weights),
         flip: Some(flip(truth, technique, counted)),
     })
+}
+
+/// A count of wrong pixels that grows pixel by pixel, for pictures of which not all is known yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Number of pixels.
+    pub counted: u64,
+    /// Number of pixels that are lit and should be dark: visibility exceeds the truth by more than
+    /// 1/2.
+    pub false_light: u64,
+    /// Number of pixels that are dark and should be lit.
+    pub false_shadow: u64,
+    sum: f64,
+}
+
+impl Tally {
+    /// Counts a pixel with these visibilities from 0 to 1; values outside are clamped.
+    pub fn add(&mut self, truth: f32, technique: f32) {
+        self.add_difference(difference(truth, technique));
+    }
+
+    fn add_difference(&mut self, difference: f32) {
+        self.counted += 1;
+        self.false_light += u64::from(difference > 0.5);
+        self.false_shadow += u64::from(difference < -0.5);
+        self.sum += f64::from(difference.abs());
+    }
+
+    fn share(&self, count: u64) -> Option<f64> {
+        (self.counted > 0).then(|| count as f64 / self.counted as f64)
+    }
+
+    /// [`Metrics::wrong_fraction`] of the pixels counted so far; `None` without any.
+    pub fn wrong_fraction(&self) -> Option<f64> {
+        self.share(self.false_light + self.false_shadow)
+    }
+
+    /// [`Metrics::mean_abs_error`] of the pixels counted so far; `None` without any.
+    pub fn mean_abs_error(&self) -> Option<f64> {
+        (self.counted > 0).then(|| self.sum / self.counted as f64)
+    }
 }
 
 /// The distribution of `error`, in pixels per texel, over the `counted` pixels. Values that are not
@@ -193,7 +230,12 @@ fn differences<'a>(
     let pairs = truth.pixels().iter().zip(technique.pixels());
     pairs
         .zip(counted.pixels())
-        .map(|((t, v), &counted)| counted.then(|| v.clamp(0.0, 1.0) - t.clamp(0.0, 1.0)))
+        .map(|((&t, &v), &counted)| counted.then(|| difference(t, v)))
+}
+
+/// How much lighter a pixel is than the truth, −1 to 1.
+fn difference(truth: f32, technique: f32) -> f32 {
+    technique.clamp(0.0, 1.0) - truth.clamp(0.0, 1.0)
 }
 
 pub(crate) fn check_visibilities(

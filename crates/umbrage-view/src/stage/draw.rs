@@ -1,0 +1,401 @@
+//! Draws the frames that the window requests.
+
+use super::errors::Visibility;
+use super::mailbox::Mailbox;
+use super::request::{Costs, DrawnPicture, Frame, Picture, Request, Shining};
+use super::truth::{SharedTruth, TruthJob};
+use super::{News, Reporter};
+use glam::DVec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use umbrage::visibility::Filter;
+use umbrage::{Bounds, Camera, Light, Plan, Planner, SeenTiles, Technique};
+use umbrage_lab::{
+    Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, milliseconds,
+    plan_with, planner, runs_on_gpu,
+};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
+use umbrage_trace::Tracer;
+use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
+
+/// The number of techniques' renderers that each picture keeps, so that changing to and fro is
+/// quick.
+const RENDERERS: usize = 3;
+
+/// Every so many frames, the time of a picture without lookups is measured.
+const BARE_EVERY: u64 = 16;
+
+/// Rows of a picture that are read back at a time, so that a new request has not long to wait.
+const ROWS: u32 = 128;
+
+/// Draws one scene.
+pub(super) struct Artist<'a> {
+    prepared: &'a PreparedScene<'a>,
+    gpu: &'a Gpu,
+    buffers: &'a SceneBuffers<'a>,
+    reporter: &'a Reporter,
+    frames: &'a AtomicU64,
+    easels: Vec<Easel<'a>>,
+    bare: Bare<'a>,
+    receivers: Vec<(Fit, Receivers)>,
+    scout: Option<Scout<'a>>,
+    /// The last frame, and whether its truth and errors were asked for.
+    last: Option<(Arc<Frame>, bool)>,
+    body: (Option<Camera>, Arc<Vec<[DVec3; 2]>>),
+}
+
+/// What draws one of a frame's pictures.
+struct Easel<'a> {
+    /// The one that was used last comes last.
+    renderers: Vec<(ShadowOptions, Renderer<'a, 'a>)>,
+    planner: Planner,
+    targets: Targets,
+    timer: Option<Timer>,
+    times: Option<StageTimes>,
+}
+
+/// What draws pictures without lookups.
+struct Bare<'a> {
+    renderer: Option<Renderer<'a, 'a>>,
+    targets: Targets,
+    timer: Option<Timer>,
+    ms: Option<f64>,
+}
+
+/// Targets that nobody looks at any more are drawn into again.
+#[derive(Default)]
+struct Targets(Vec<Arc<FrameTarget>>);
+
+impl Targets {
+    fn free(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<Arc<FrameTarget>, String> {
+        let size_of = |t: &FrameTarget| [t.color().width(), t.color().height()];
+        self.0.retain(|target| size_of(target) == size || Arc::strong_count(target) > 1);
+        let free = self.0.iter().find(|t| Arc::strong_count(t) == 1 && size_of(t) == size);
+        if let Some(target) = free {
+            return Ok(Arc::clone(target));
+        }
+        let target = Arc::new(FrameTarget::new(gpu, size).map_err(|e| e.to_string())?);
+        self.0.push(Arc::clone(&target));
+        Ok(target)
+    }
+}
+
+impl<'a> Artist<'a> {
+    /// `None` without a GPU.
+    pub(super) fn new(
+        prepared: &'a PreparedScene<'a>,
+        reporter: &'a Reporter,
+        frames: &'a AtomicU64,
+    ) -> Option<Self> {
+        let (gpu, buffers) = prepared.render().on_gpu()?;
+        Some(Self {
+            prepared,
+            gpu,
+            buffers,
+            reporter,
+            frames,
+            easels: Vec::new(),
+            bare: Bare { renderer: None, targets: Targets::default(), timer: Timer::new(gpu), ms: None },
+            receivers: Vec::new(),
+            scout: None,
+            last: None,
+            body: Default::default(),
+        })
+    }
+
+    fn tracer(&self) -> &'a Tracer<'a> {
+        self.prepared.render().tracer()
+    }
+
+    /// Draws a frame and sends it to the window.
+    pub(super) fn draw(&mut self, request: Request) {
+        let light = match request.light {
+            Shining::Light(light) => light,
+            Shining::OfScene(index) => match self.tracer().scene().lights.get(index) {
+                Some(light) => light.light,
+                None => return,
+            },
+        };
+        let planned_for = request.planned_for.unwrap_or(request.camera);
+        let number = self.frames.fetch_add(1, Ordering::Relaxed) + 1;
+        let seen = self.seen(request.fit, &planned_for);
+        let (seen, problem) = match seen {
+            Ok(seen) => (seen, None),
+            Err(problem) => (None, Some(problem)),
+        };
+        let mut pictures = Vec::with_capacity(request.techniques.len());
+        for (i, technique) in request.techniques.iter().enumerate() {
+            let drawn = match &problem {
+                Some(problem) => Err(problem.clone()),
+                None => self.picture(i, technique, &request, &planned_for, &light, seen.as_ref()),
+            };
+            pictures.push(Picture { technique: technique.clone(), drawn });
+        }
+        let map = request.map.and_then(|map| self.map(map));
+        let body = self.body(&request, seen.as_ref());
+        finish(self.gpu);
+        for (easel, picture) in self.easels.iter_mut().zip(&mut pictures) {
+            easel.read_times(self.gpu);
+            if let (Some(times), Ok(drawn)) = (&easel.times, &mut picture.drawn) {
+                drawn.costs.add_times(times, self.bare.ms);
+            }
+        }
+        if number % BARE_EVERY == 1 {
+            self.measure_bare(&request.camera, &light);
+        }
+        if let Err(e) = self.gpu.check() {
+            self.reporter.tell(News::Refused(e.to_string()));
+        }
+        let frame = Arc::new(Frame { request, number, light, pictures, map, body });
+        self.last = Some((Arc::clone(&frame), false));
+        self.reporter.tell(News::Frame(frame));
+    }
+
+    /// Draws one of a frame's pictures.
+    fn picture(
+        &mut self,
+        index: usize,
+        technique: &NamedTechnique,
+        request: &Request,
+        planned_for: &Camera,
+        light: &Light,
+        seen: Option<&SeenTiles>,
+    ) -> Result<DrawnPicture, String> {
+        if !runs_on_gpu(technique.technique()) {
+            return Err("no GPU rasterises bent rows; `umbrage render` traces them".into());
+        }
+        let (gpu, buffers, tracer) = (self.gpu, self.buffers, self.tracer());
+        let receivers = receivers(&mut self.receivers, self.prepared, request.fit);
+        let bounds = receivers.bounds(seen);
+        while self.easels.len() <= index {
+            self.easels.push(Easel::new(gpu));
+        }
+        let easel = &mut self.easels[index];
+        let start = Instant::now();
+        let plan = easel.plan(technique, planned_for, light, &bounds).map_err(|e| e.to_string())?;
+        let plan_ms = milliseconds(start);
+        let target = easel.targets.free(gpu, request.camera.image())?;
+        let (renderer, timer) = easel.renderer(gpu, buffers, technique, plan.fade.is_some())?;
+        let text = |e: umbrage_render::Error| e.to_string();
+        renderer.leave_out(edge_on(&plan, tracer));
+        let eye = request.camera.eye();
+        let maps = renderer.draw_maps(&plan, eye, Casters::Unmoved, timer).map_err(text)?;
+        let shading = Shading { camera: &request.camera, light, light_index: 0 };
+        let picture = renderer.frame(&shading, &target, request.overlay.map(Into::into), timer).map_err(text)?;
+        let costs = Costs {
+            plan_ms,
+            texels: plan.texels(),
+            bytes: renderer.shadows().lookup_bytes(),
+            map_draws: maps.iter().map(|(_, drawn)| drawn.draws).sum(),
+            map_triangles: maps.iter().map(|(_, drawn)| drawn.triangles).sum(),
+            picture_draws: picture.draws,
+            picture_triangles: picture.triangles,
+            ..Costs::default()
+        };
+        Ok(DrawnPicture { target, plan: Arc::new(plan), costs })
+    }
+
+    /// What the camera sees, if maps are fitted to that.
+    fn seen(&mut self, fit: Fit, camera: &Camera) -> Result<Option<SeenTiles>, String> {
+        if fit != Fit::Seen {
+            return Ok(None);
+        }
+        let text = |e: Error| e.to_string();
+        if self.scout.is_none() {
+            self.scout = Some(Scout::new(self.gpu, self.buffers).map_err(text)?);
+        }
+        match &mut self.scout {
+            Some(scout) => scout.seen(camera).map_err(text),
+            None => Ok(None),
+        }
+    }
+
+    /// Draws a map of the first picture as a picture of its own.
+    fn map(&mut self, map: usize) -> Option<Arc<FrameTarget>> {
+        let gpu = self.gpu;
+        let easel = self.easels.first_mut()?;
+        let (_, renderer) = easel.renderers.last_mut()?;
+        let [width, height] = renderer.shadows().place(map)?.size;
+        let most = width.max(height).div_ceil(MAP_SIDE);
+        let target = easel.targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
+        renderer.map_picture(map, &target).ok()?;
+        Some(target)
+    }
+
+    /// The edges of body B if it is seen from outside.
+    fn body(&mut self, request: &Request, seen: Option<&SeenTiles>) -> Arc<Vec<[DVec3; 2]>> {
+        if self.body.0 != request.planned_for {
+            let receivers = receivers(&mut self.receivers, self.prepared, request.fit);
+            let edges = request.planned_for.map(|camera| {
+                umbrage::seen_edges(&camera, &receivers.bounds(seen)).unwrap_or_default()
+            });
+            self.body = (request.planned_for, Arc::new(edges.unwrap_or_default()));
+        }
+        Arc::clone(&self.body.1)
+    }
+
+    /// Measures the time of a picture without lookups.
+    fn measure_bare(&mut self, camera: &Camera, light: &Light) {
+        let (gpu, buffers) = (self.gpu, self.buffers);
+        let bare = &mut self.bare;
+        let Some(timer) = &mut bare.timer else { return };
+        if bare.renderer.is_none() {
+            let options = ShadowOptions { filter: Filter::None, ..ShadowOptions::default() };
+            bare.renderer = Renderer::new(gpu, buffers, &options).ok();
+        }
+        let Some(renderer) = &mut bare.renderer else { return };
+        let Ok(target) = bare.targets.free(gpu, camera.image()) else { return };
+        let plan = Plan { origin: camera.eye(), filter: Filter::None, ..Plan::default() };
+        let shading = Shading { camera, light, light_index: 0 };
+        let drawn = renderer
+            .draw_maps(&plan, camera.eye(), Casters::Unmoved, None)
+            .and_then(|_| renderer.frame(&shading, &target, None, Some(timer)));
+        if drawn.is_ok() {
+            finish(gpu);
+            bare.ms = timer.try_read(gpu).map(|times| times.picture_ms).or(bare.ms);
+        }
+    }
+
+    /// Begins what takes longer than a frame, as long as nothing new is requested.
+    pub(super) fn rest(&mut self, truths: &Mailbox<TruthJob>, is_moving: &dyn Fn() -> bool) {
+        let Some((frame, is_asked_for)) = &mut self.last else { return };
+        if *is_asked_for || !frame.request.wants_truth || frame.request.planned_for.is_some() {
+            return;
+        }
+        *is_asked_for = true;
+        let frame = Arc::clone(frame);
+        let camera = frame.request.camera;
+        let picture = SharedTruth::new(frame.number, &camera);
+        self.reporter.tell(News::Truth(picture.clone()));
+        let light_size = frame.request.light_size;
+        truths.put(TruthJob { camera, light: frame.light, light_size, picture });
+        let shading = Shading { camera: &camera, light: &frame.light, light_index: 0 };
+        let height = camera.image()[1];
+        for (technique, picture) in frame.pictures.iter().enumerate() {
+            if picture.drawn.is_err() {
+                continue;
+            }
+            let Some((_, renderer)) = self.easels[technique].renderers.last_mut() else { continue };
+            let mut values = Vec::with_capacity((camera.image()[0] * height) as usize);
+            for first in (0..height).step_by(ROWS as usize) {
+                if is_moving() {
+                    return;
+                }
+                let rows = first..height.min(first + ROWS);
+                match renderer.samples(&shading, rows, 1, false) {
+                    Ok(samples) => values.extend(samples.iter().map(|s| s.visibility)),
+                    Err(e) => return self.reporter.tell(News::Refused(e.to_string())),
+                }
+                let values = values.clone();
+                let visibility = Visibility { frame: frame.number, technique, values };
+                self.reporter.tell(News::Visibility(visibility));
+            }
+        }
+    }
+}
+
+/// The options of a technique's lookups.
+pub(super) fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
+    ShadowOptions {
+        filter: technique.filter,
+        buffers: LookupBuffers::for_technique(technique, 1),
+        fades,
+        ..ShadowOptions::default()
+    }
+}
+
+/// The longest side of the picture of a map, pixels.
+const MAP_SIDE: u32 = 1024;
+
+/// The receivers for a fit, found when they are first needed.
+fn receivers<'r>(
+    known: &'r mut Vec<(Fit, Receivers)>,
+    prepared: &PreparedScene<'_>,
+    fit: Fit,
+) -> &'r Receivers {
+    let index = known.iter().position(|(f, _)| *f == fit).unwrap_or_else(|| {
+        let tracer = prepared.render().tracer();
+        known.push((fit, Receivers::new(tracer.scene(), tracer, fit)));
+        known.len() - 1
+    });
+    &known[index].1
+}
+
+/// Waits until the device has done all work. While it waits, other threads may submit more: a wait
+/// of the device's own would keep them from that.
+fn finish(gpu: &Gpu) {
+    const LOOK: Duration = Duration::from_micros(500);
+    let is_done = Arc::new(AtomicBool::new(false));
+    let done = Arc::clone(&is_done);
+    gpu.queue().on_submitted_work_done(move || done.store(true, Ordering::Release));
+    while !is_done.load(Ordering::Acquire) && gpu.lost().is_none() {
+        if gpu.device().poll(wgpu::PollType::Poll).is_err() {
+            return;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+impl<'a> Easel<'a> {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            renderers: Vec::new(),
+            planner: planner(),
+            targets: Targets::default(),
+            timer: Timer::new(gpu),
+            times: None,
+        }
+    }
+
+    fn plan(
+        &mut self,
+        technique: &NamedTechnique,
+        camera: &Camera,
+        light: &Light,
+        bounds: &Bounds<'_>,
+    ) -> Result<Plan, Error> {
+        fade(&mut self.planner, camera, bounds)?;
+        plan_with(&mut self.planner, technique, camera, light, bounds).cloned()
+    }
+
+    /// The renderer of a technique, and the timer of its frames.
+    fn renderer(
+        &mut self,
+        gpu: &'a Gpu,
+        buffers: &'a SceneBuffers<'a>,
+        technique: &NamedTechnique,
+        fades: bool,
+    ) -> Result<(&mut Renderer<'a, 'a>, Option<&mut Timer>), String> {
+        let options = shadow_options(technique.technique(), fades);
+        let known = self.renderers.iter().position(|(known, _)| *known == options);
+        let renderer = match known {
+            Some(known) => self.renderers.remove(known),
+            None => {
+                let made = Renderer::new(gpu, buffers, &options).map_err(|e| e.to_string())?;
+                (options, made)
+            }
+        };
+        if self.renderers.len() >= RENDERERS {
+            self.renderers.remove(0);
+        }
+        self.renderers.push(renderer);
+        let last = self.renderers.len() - 1;
+        Ok((&mut self.renderers[last].1, self.timer.as_mut()))
+    }
+
+    fn read_times(&mut self, gpu: &Gpu) {
+        if let Some(times) = self.timer.as_mut().and_then(|timer| timer.try_read(gpu)) {
+            self.times = Some(times);
+        }
+    }
+}
+
+impl Costs {
+    fn add_times(&mut self, times: &StageTimes, bare_ms: Option<f64>) {
+        self.depth_ms = Some(times.depth_ms);
+        self.filter_ms = Some(times.filter_ms);
+        self.picture_ms = Some(times.picture_ms);
+        self.lookup_ms = bare_ms.map(|bare| (times.picture_ms - bare).max(0.0));
+    }
+}

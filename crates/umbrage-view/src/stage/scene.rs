@@ -1,0 +1,118 @@
+//! The thread that opens a scene and then draws it.
+
+use super::draw::Artist;
+use super::jobs::{Job, do_jobs};
+use super::mailbox::{Mail, Mailbox};
+use super::request::{Request, SceneInfo};
+use super::truth::{TruthJob, trace_jobs};
+use super::{News, Reporter};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+use umbrage_lab::{
+    Executors, Fit, LightOptions, PreparedScene, SceneOptions, ViewOptions, choose_light,
+    choose_view, open_scene,
+};
+use umbrage_render::Gpu;
+
+/// A scene to open, and the view and light to begin with.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SceneToOpen {
+    /// The folder that a relative path begins in.
+    pub(crate) folder: PathBuf,
+    /// A path, or the name of a built-in scene.
+    pub(crate) name: String,
+    pub(crate) changes: SceneOptions,
+    /// Whether alpha masks are ignored.
+    pub(crate) opaque: bool,
+    pub(crate) view: ViewOptions,
+    pub(crate) light: LightOptions,
+}
+
+/// After this time without a new request a view rests. Then what takes longer than a frame is
+/// done: truth and errors.
+const REST: Duration = Duration::from_millis(150);
+
+/// Opens a scene and draws what is requested, until there are no requests any more.
+pub(super) fn run(
+    scene: &SceneToOpen,
+    gpu: Gpu,
+    reporter: &Reporter,
+    requests: &Mailbox<Request>,
+    jobs: &Receiver<Job>,
+    frames: &AtomicU64,
+) {
+    if let Err(problem) = open_and_draw(scene, gpu, reporter, requests, jobs, frames) {
+        reporter.tell(News::Failed(problem));
+    }
+}
+
+fn open_and_draw(
+    to_open: &SceneToOpen,
+    gpu: Gpu,
+    reporter: &Reporter,
+    requests: &Mailbox<Request>,
+    jobs: &Receiver<Job>,
+    frames: &AtomicU64,
+) -> Result<(), String> {
+    let stage = |name| match requests.is_pending() {
+        // Nothing is requested of a scene that is not open, so its window has given it up.
+        true => Err(String::new()),
+        false => {
+            reporter.tell(News::Opening(name));
+            Ok(())
+        }
+    };
+    stage("reading")?;
+    let SceneToOpen { folder, name, changes, opaque, view, light } = to_open;
+    let scene = open_scene(folder, name, changes).map_err(|e| e.to_string())?;
+    stage("preparing")?;
+    let executors = Executors::with_gpu(gpu);
+    let prepared = PreparedScene::new(&scene, &executors, *opaque, Fit::Surfaces)
+        .map_err(|e| e.to_string())?;
+    stage("choosing a view")?;
+    let chosen = choose_view(view, prepared.defaults()).map_err(|e| e.to_string())?;
+    let chosen_light = choose_light(light, prepared.defaults()).map_err(|e| e.to_string())?;
+    let (cameras, lights) = SceneInfo::cameras_and_lights(&scene);
+    let notices = scene.all_notices().into_iter().map(|n| n.0);
+    let info = SceneInfo {
+        name: name.clone(),
+        cameras,
+        lights,
+        clips: Vec::new(),
+        notices: notices.chain(chosen.notices).collect(),
+        bounds: scene.bounds(),
+        boxes: prepared.render().tracer().boxes(umbrage_lab::SURFACE_BOXES),
+        view: chosen.view,
+        view_name: chosen.name,
+        light: chosen_light.light,
+        light_name: chosen_light.name,
+        triangles: scene.drawn_triangles(),
+    };
+    let mut artist = Artist::new(&prepared, reporter, frames).ok_or("there is no GPU")?;
+    reporter.tell(News::Open(Arc::new(info)));
+    let truths = Mailbox::<TruthJob>::default();
+    std::thread::scope(|scope| {
+        let tracer = prepared.render().tracer();
+        scope.spawn(|| trace_jobs(tracer, &truths, || reporter.tell(News::TruthGrew)));
+        scope.spawn(|| do_jobs(&prepared, jobs, requests, reporter));
+        let mut rests = true;
+        loop {
+            match requests.take((!rests).then_some(REST)) {
+                Mail::New(request) => {
+                    artist.draw(request);
+                    rests = false;
+                }
+                Mail::None => {
+                    artist.rest(&truths, &|| requests.is_pending());
+                    rests = true;
+                }
+                Mail::Closed => break,
+            }
+        }
+        truths.close();
+    });
+    Ok(())
+}
