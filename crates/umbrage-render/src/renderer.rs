@@ -1,3 +1,4 @@
+use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::points::Points;
 use crate::scene::SceneBuffers;
@@ -15,13 +16,12 @@ use umbrage_wgpu::{
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, Extent3d,
-    FragmentState, IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
+    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
+    IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
     RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StoreOp, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
-    TextureView, TextureViewDescriptor, VertexAttribute, VertexBufferLayout, VertexFormat,
+    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
     VertexState, VertexStepMode,
 };
 
@@ -261,11 +261,11 @@ impl<'g, 's> Renderer<'g, 's> {
         let tile = Tile::whole(shading.camera);
         let pipelines = self.pipelines("frame", &[FRAME_FORMAT]);
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
-        let FrameTarget { color_view, depth, .. } = target;
-        let color = &[color_view][..];
-        let depth_store = StoreOp::Store;
-        let target = Target { color, depth, depth_store, pipelines: &pipelines };
-        let drawn = self.encode_picture(&mut encoder, shading, &tile, &target, timer)?;
+        let color = &[&target.color_view][..];
+        let (depth, depth_store) = (&target.depth, StoreOp::Store);
+        let parts = Target { color, depth, depth_store, pipelines: &pipelines };
+        let drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
+        target.encode_copy(&mut encoder);
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
         }
@@ -392,54 +392,6 @@ fn view_bindings(device: &wgpu::Device) -> (Buffer, wgpu::BindGroupLayout, BindG
         entries: &[BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
     });
     (buffer, layout, group)
-}
-
-/// Texture format of the frames to display.
-pub const FRAME_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
-
-/// The textures that frames are drawn into.
-pub struct FrameTarget {
-    color: Texture,
-    color_view: TextureView,
-    depth: TextureView,
-}
-
-impl FrameTarget {
-    /// Makes a target of this width and height, pixels.
-    ///
-    /// # Errors
-    /// The target is larger than the device's largest texture.
-    pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self, Error> {
-        let max = gpu.device().limits().max_texture_dimension_2d;
-        if width > max || height > max {
-            return Err(Error::TooLarge {
-                what: format!("a frame of {width}x{height} pixels"),
-                problem: format!("at most {max} pixels in width and height"),
-            });
-        }
-        let texture = |format, usage| {
-            gpu.device().create_texture(&TextureDescriptor {
-                label: Some("frame"),
-                size: Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: TextureDimension::D2,
-                format,
-                usage: TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let color = texture(FRAME_FORMAT, TextureUsages::COPY_SRC);
-        let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
-        let depth = view(&texture(DEPTH_FORMAT, TextureUsages::TEXTURE_BINDING));
-        gpu.check()?;
-        Ok(Self { color_view: view(&color), color, depth })
-    }
-
-    /// The picture, in sRGB with the format [`FRAME_FORMAT`].
-    pub fn color(&self) -> &Texture {
-        &self.color
-    }
 }
 
 /// The textures that a picture is drawn into, and the pipelines that draw it.

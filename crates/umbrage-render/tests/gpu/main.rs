@@ -3,6 +3,7 @@
 mod parity;
 mod pictures;
 mod trouble;
+mod window;
 
 use std::path::Path;
 use std::sync::LazyLock;
