@@ -1,5 +1,6 @@
 //! On a real device, lavapipe where there is no other.
 
+mod overlays;
 mod parity;
 mod pictures;
 mod trouble;
