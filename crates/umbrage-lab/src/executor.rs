@@ -85,7 +85,7 @@ impl<'a> RenderScene<'a> {
                 let is_prefiltered = filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
                 let tracer = &self.tracer;
-                Work::Gpu(Box::new(OnGpu { renderer, gpu, tracer, timer, plan: None }))
+                Work::Gpu(Box::new(OnGpu { renderer, gpu, tracer, timer, has_maps: false }))
             }
             None => Work::Reference { tracer: &self.tracer, maps: None },
         };
@@ -152,8 +152,8 @@ pub(crate) struct OnGpu<'a> {
     tracer: &'a Tracer<'a>,
     /// Measures the time of the prefilter; `None` without a prefilter or without timestamps.
     timer: Option<Timer>,
-    /// The plan whose maps are drawn.
-    plan: Option<&'a Plan>,
+    /// Whether maps are drawn.
+    has_maps: bool,
 }
 
 impl OnGpu<'_> {
@@ -199,11 +199,11 @@ impl<'a> Executor<'a> {
     pub fn render(&mut self, new: &'a Plan, progress: Progress<'_>) -> Result<Option<f64>, Error> {
         match &mut self.work {
             Work::Gpu(on) => {
-                let OnGpu { renderer, gpu, tracer, timer, plan } = &mut **on;
+                let OnGpu { renderer, gpu, tracer, timer, has_maps } = &mut **on;
                 renderer.leave_out(edge_on(new, tracer));
                 renderer.draw_maps(new, Casters::Unmoved, timer.as_ref()).on_gpu()?;
                 gpu.wait()?;
-                *plan = Some(new);
+                *has_maps = true;
                 Ok(timer.as_ref().map(|t| t.read(gpu)).transpose()?.map(|[_, filter, _]| filter))
             }
             Work::Reference { tracer, maps } => {
@@ -256,12 +256,14 @@ impl<'a> Executor<'a> {
     pub fn visibility(&mut self, samples: &[&Sample]) -> Result<Vec<f32>, Error> {
         match &mut self.work {
             Work::Gpu(on) => {
-                let plan = on.plan.ok_or(Error::NoMaps)?;
+                if !on.has_maps {
+                    return Err(Error::NoMaps);
+                }
                 let points: Vec<_> = samples
                     .iter()
                     .map(|s| [s.surface.position, s.surface.geometric_normal])
                     .collect();
-                Ok(on.renderer.visibility(plan, 0, &points)?)
+                Ok(on.renderer.visibility(0, &points)?)
             }
             Work::Reference { maps, .. } => {
                 let (_, reference) = maps.as_ref().ok_or(Error::NoMaps)?;

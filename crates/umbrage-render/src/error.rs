@@ -27,6 +27,14 @@ pub enum Error {
         /// The limit that it exceeds.
         problem: String,
     },
+    /// An argument has a value that it cannot have.
+    #[error("{field} {problem}")]
+    Invalid {
+        /// The argument, or its field.
+        field: &'static str,
+        /// What it must be, and what it is.
+        problem: String,
+    },
     /// An error of [`umbrage_wgpu`].
     #[error(transparent)]
     Shadows(#[from] umbrage_wgpu::Error),

@@ -3,17 +3,19 @@ use crate::samples::SAMPLE_FORMAT;
 use std::sync::{Arc, Mutex, PoisonError};
 use umbrage_wgpu::Support;
 use wgpu::{
-    Adapter, AdapterInfo, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
-    DeviceDescriptor, DeviceType, ExperimentalFeatures, Features, Instance, InstanceDescriptor,
-    MemoryHints, PollType, Queue, TextureUsages, Trace,
+    Adapter, AdapterInfo, Backend, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
+    DeviceDescriptor, DeviceType, DownlevelFlags, ExperimentalFeatures, Features, Instance,
+    InstanceDescriptor, MemoryHints, PollType, Queue, TextureUsages, Trace,
 };
 
-/// A GPU device without a window.
+/// A GPU device, with or without a window.
 pub struct Gpu {
     device: Device,
     queue: Queue,
     info: AdapterInfo,
     support: Support,
+    /// Whether textures can be read in another format than that in which they are written.
+    pub(crate) has_view_formats: bool,
     trouble: Arc<Mutex<Trouble>>,
 }
 
@@ -51,7 +53,18 @@ fn is_software(info: &AdapterInfo) -> bool {
     info.device_type == DeviceType::Cpu
 }
 
-/// All adapters, the best first: hardware before software.
+/// The place of an adapter among all, the best first: hardware before software, and OpenGL last.
+fn rank(info: &AdapterInfo) -> (bool, u32) {
+    let kind = match info.device_type {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Other => 3,
+        DeviceType::Cpu => 4,
+    };
+    (info.backend == Backend::Gl, kind)
+}
+
 fn adapters() -> Vec<Adapter> {
     let backends = Backends::from_env().unwrap_or(Backends::all());
     // OpenGL is only tried if there is nothing else, because some drivers print messages when it is
@@ -66,15 +79,7 @@ fn adapters_of(backends: Backends) -> Vec<Adapter> {
     }
     let descriptor = InstanceDescriptor::new_without_display_handle_from_env();
     let instance = Instance::new(InstanceDescriptor { backends, ..descriptor });
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
-    adapters.sort_by_key(|a| match a.get_info().device_type {
-        DeviceType::DiscreteGpu => 0,
-        DeviceType::IntegratedGpu => 1,
-        DeviceType::VirtualGpu => 2,
-        DeviceType::Other => 3,
-        DeviceType::Cpu => 4,
-    });
-    adapters
+    pollster::block_on(instance.enumerate_adapters(backends))
 }
 
 /// Reports on all adapters, the best first. Each adapter is opened for a moment.
@@ -90,19 +95,13 @@ pub fn devices() -> Vec<AdapterReport> {
             has_timestamps: adapter.features().contains(Features::TIMESTAMP_QUERY),
         }
     };
-    adapters().into_iter().map(report).collect()
+    let mut adapters = adapters();
+    adapters.sort_by_key(|a| rank(&a.get_info()));
+    adapters.into_iter().map(report).collect()
 }
 
 fn open(adapter: &Adapter) -> Result<(Device, Queue), Error> {
-    let request = adapter.request_device(&DeviceDescriptor {
-        label: Some("umbrage"),
-        required_features: adapter.features() & WANTED,
-        required_limits: adapter.limits(),
-        experimental_features: ExperimentalFeatures::disabled(),
-        memory_hints: MemoryHints::Performance,
-        trace: Trace::Off,
-    });
-    pollster::block_on(request)
+    pollster::block_on(adapter.request_device(&Gpu::wanted(adapter)))
         .map_err(|e| Error::NoDevice { adapter: adapter.get_info().name, problem: e.to_string() })
 }
 
@@ -128,16 +127,9 @@ impl Gpu {
     /// # Errors
     /// There is no suitable adapter.
     pub fn open() -> Result<Self, Error> {
-        let wanted = std::env::var("WGPU_ADAPTER_NAME").ok().map(|n| n.to_lowercase());
-        let is_wanted = |a: &Adapter| {
-            wanted.as_ref().is_none_or(|w| a.get_info().name.to_lowercase().contains(w))
-        };
-        let mut problem = match &wanted {
-            Some(name) => format!("none is called `{name}`"),
-            None => "install a driver for Vulkan, Metal or Direct3D 12".to_owned(),
-        };
-        for adapter in adapters().iter().filter(|a| is_wanted(a)) {
-            match Self::of(adapter) {
+        let mut problem = String::new();
+        for adapter in Self::choices(&adapters())? {
+            match open(&adapter).and_then(|(d, q)| Self::from_device(&adapter, d, q)) {
                 Ok(gpu) => return Ok(gpu),
                 Err(e) => problem = e.to_string(),
             }
@@ -145,10 +137,53 @@ impl Gpu {
         Err(Error::NoAdapter(problem))
     }
 
-    fn of(adapter: &Adapter) -> Result<Self, Error> {
-        let (device, queue) = open(adapter)?;
+    /// Those of `adapters` that may be taken, the best first: hardware before software, and OpenGL
+    /// last, whose drivers lack most. If the environment variable `WGPU_ADAPTER_NAME` is set, its
+    /// value must be a part of their names.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn choices(adapters: &[Adapter]) -> Result<Vec<Adapter>, Error> {
+        let wanted = std::env::var("WGPU_ADAPTER_NAME").ok();
+        let lower = wanted.as_ref().map(|name| name.to_lowercase());
+        let is_wanted = |a: &&Adapter| {
+            lower.as_ref().is_none_or(|w| a.get_info().name.to_lowercase().contains(w))
+        };
+        let mut choices: Vec<Adapter> = adapters.iter().filter(is_wanted).cloned().collect();
+        choices.sort_by_key(|a| rank(&a.get_info()));
+        match wanted {
+            _ if !choices.is_empty() => Ok(choices),
+            Some(name) => Err(Error::NoAdapter(format!("none is called `{name}`"))),
+            None => {
+                Err(Error::NoAdapter("install a driver for Vulkan, Metal or Direct3D 12".into()))
+            }
+        }
+    }
+
+    /// The device to request of an adapter: all of its limits, and those of its features that make
+    /// work faster or more complete.
+    pub fn wanted(adapter: &Adapter) -> DeviceDescriptor<'static> {
+        DeviceDescriptor {
+            label: Some("umbrage"),
+            required_features: adapter.features() & WANTED,
+            required_limits: adapter.limits(),
+            experimental_features: ExperimentalFeatures::disabled(),
+            memory_hints: MemoryHints::Performance,
+            trace: Trace::Off,
+        }
+    }
+
+    /// Takes a device that something else has opened on this adapter, a window for example. It
+    /// should be the one that [`wanted`](Self::wanted) describes; with fewer features, work is
+    /// slower or less complete. From now on, its errors are reported here: this replaces the
+    /// device's handlers of errors and of its loss.
+    ///
+    /// # Errors
+    /// The device is not suitable.
+    pub fn from_device(adapter: &Adapter, device: Device, queue: Queue) -> Result<Self, Error> {
         let support = Support::new(adapter, &device)?;
         check_renderer(adapter)?;
+        let flags = adapter.get_downlevel_capabilities().flags;
         let trouble = Arc::new(Mutex::new(Trouble::default()));
         let told = Arc::clone(&trouble);
         device.set_device_lost_callback(move |_, message| {
@@ -158,7 +193,14 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(move |error| {
             lock(&told).refused.get_or_insert(error.to_string());
         }));
-        Ok(Self { device, queue, info: adapter.get_info(), support, trouble })
+        Ok(Self {
+            device,
+            queue,
+            info: adapter.get_info(),
+            support,
+            has_view_formats: flags.contains(DownlevelFlags::VIEW_FORMATS),
+            trouble,
+        })
     }
 
     /// The wgpu device.
@@ -223,6 +265,11 @@ impl Gpu {
         Ok(values)
     }
 
+    /// The device's message if it was lost, which is final.
+    pub fn lost(&self) -> Option<String> {
+        lock(&self.trouble).lost.clone()
+    }
+
     /// Checks whether an error occurred on the device since the last check.
     ///
     /// # Errors
@@ -244,4 +291,22 @@ impl Gpu {
 fn lock(trouble: &Mutex<Trouble>) -> std::sync::MutexGuard<'_, Trouble> {
     // A thread that panicked did so after writing, so the data is complete.
     trouble.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hardware_comes_first_and_opengl_last() {
+        let ranked = [
+            (DeviceType::DiscreteGpu, Backend::Vulkan),
+            (DeviceType::IntegratedGpu, Backend::Metal),
+            (DeviceType::VirtualGpu, Backend::Vulkan),
+            (DeviceType::Cpu, Backend::Vulkan),
+            (DeviceType::DiscreteGpu, Backend::Gl),
+            (DeviceType::Cpu, Backend::Gl),
+        ];
+        assert!(ranked.map(|(kind, backend)| rank(&AdapterInfo::new(kind, backend))).is_sorted());
+    }
 }

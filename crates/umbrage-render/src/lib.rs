@@ -1,14 +1,16 @@
 //! A small forward renderer for Umbrage's scenes, with textures, one light, a sky and tone mapping.
 //! Its shadows come from [`umbrage_wgpu`], of which it uses only the public API.
 //!
-//! - [`Gpu`] is a device without a window; [`devices`] reports on all adapters.
+//! - [`Gpu`] is a device, opened here or by a window; [`devices`] reports on all adapters.
 //! - [`SceneBuffers`] hold the meshes and materials of a scene on the device.
 //! - [`Renderer`] draws the maps of a plan, and then [frames](Renderer::frame) to display or
 //!   [samples](Renderer::samples) to measure.
 
 mod error;
+mod frame_target;
 mod gpu;
 mod instances;
+mod overlay;
 mod points;
 mod renderer;
 mod samples;
@@ -17,9 +19,11 @@ mod timer;
 mod view;
 
 pub use error::Error;
+pub use frame_target::{FRAME_FORMAT, FrameTarget};
 pub use gpu::{AdapterReport, Gpu, devices};
 pub use instances::EdgeOn;
-pub use renderer::{Drawn, FRAME_FORMAT, FrameTarget, Renderer, Shading};
+pub use overlay::{Overlay, PARTITION_COLORS, SCALE_COLORS};
+pub use renderer::{Drawn, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
 pub use timer::Timer;

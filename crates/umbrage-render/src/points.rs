@@ -4,7 +4,6 @@ use crate::renderer::Renderer;
 use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use umbrage::Plan;
 use umbrage_wgpu::Shadows;
 use wgpu::{
     BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
@@ -73,26 +72,22 @@ impl Points {
 
 impl Renderer<'_, '_> {
     /// Visibility, in [0, 1], of surface points under one of the plan's lights, as its maps have
-    /// it. Each point is a position and the normal of its triangle, both in world space. The plan's
-    /// maps must have been drawn.
+    /// it. Each point is a position and the normal of its triangle, both in world space. The maps
+    /// must have been drawn: without any, all points are lit.
     ///
     /// # Errors
     /// The device refused something or was lost.
-    pub fn visibility(
-        &mut self,
-        plan: &Plan,
-        light: u32,
-        points: &[[DVec3; 2]],
-    ) -> Result<Vec<f32>, Error> {
+    pub fn visibility(&mut self, light: u32, points: &[[DVec3; 2]]) -> Result<Vec<f32>, Error> {
         if self.points.is_none() {
             self.points = Some(Points::new(self.gpu, &self.shadows));
         }
+        let eye = self.eye.unwrap_or(DVec3::ZERO);
         let mut visibility = Vec::with_capacity(points.len());
         for points in points.chunks(BATCH) {
             let points: Vec<Point> = points
                 .iter()
                 .map(|&[position, normal]| Point {
-                    position: (position - plan.origin).as_vec3(),
+                    position: (position - eye).as_vec3(),
                     light,
                     normal: normal.as_vec3(),
                     padding: 0,

@@ -1,4 +1,6 @@
+use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
+use crate::overlay::OverlayUniform;
 use crate::points::Points;
 use crate::scene::SceneBuffers;
 use crate::timer::Timer;
@@ -15,13 +17,12 @@ use umbrage_wgpu::{
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, Extent3d,
-    FragmentState, IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
+    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
+    IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
     RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StoreOp, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
-    TextureView, TextureViewDescriptor, VertexAttribute, VertexBufferLayout, VertexFormat,
+    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
     VertexState, VertexStepMode,
 };
 
@@ -36,6 +37,7 @@ pub struct Renderer<'g, 's> {
     /// One for each material; `None` for opaque materials.
     masks: Vec<Option<BindGroup>>,
     view_buffer: Buffer,
+    pub(crate) overlay_buffer: Buffer,
     view_group: BindGroup,
     shader: ShaderModule,
     layout: PipelineLayout,
@@ -43,13 +45,15 @@ pub struct Renderer<'g, 's> {
     pictures: HashMap<&'static str, Pipelines>,
     instances: Instances,
     edge_on: Vec<EdgeOn>,
-    eye: DVec3,
+    /// Origin of the render space in which the maps are looked up, world space, metres; `None`
+    /// before maps are drawn.
+    pub(crate) eye: Option<DVec3>,
 }
 
 /// A camera and a light to shade a picture with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading<'a> {
-    /// The camera that the maps were planned for.
+    /// The camera, at the eye from which the maps are [seen](Renderer::draw_maps_seen_from).
     pub camera: &'a Camera,
     /// One of the plan's lights.
     pub light: &'a Light,
@@ -147,7 +151,9 @@ impl<'g, 's> Renderer<'g, 's> {
             )
         });
         let masks = masks.collect();
-        let (view_buffer, view_layout, view_group) = view_bindings(device);
+        let view_buffer = uniform_buffer::<ViewUniform>(device, "view");
+        let overlay_buffer = uniform_buffer::<OverlayUniform>(device, "overlay");
+        let (view_layout, view_group) = view_bindings(device, &view_buffer, &overlay_buffer);
         let shader = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("forward"),
             source: ShaderSource::Wgsl(shader_text(&change(shadows.lookup_wgsl(1))).into()),
@@ -171,13 +177,14 @@ impl<'g, 's> Renderer<'g, 's> {
             masked,
             masks,
             view_buffer,
+            overlay_buffer,
             view_group,
             shader,
             layout,
             pictures: HashMap::new(),
             instances: Instances::new(gpu),
             edge_on: Vec::new(),
-            eye: DVec3::ZERO,
+            eye: None,
         })
     }
 
@@ -203,11 +210,28 @@ impl<'g, 's> Renderer<'g, 's> {
         casters: Casters<'_>,
         timer: Option<&Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
+        self.draw_maps_seen_from(plan.origin, plan, casters, timer)
+    }
+
+    /// Like [`draw_maps`](Self::draw_maps), for frames and samples by a camera at `eye` (world
+    /// space, metres), which need not be the one that the maps were planned for. Maps are not out
+    /// of date because another camera sees them. Surfaces that they do not hold are lit, and
+    /// filters whose width is in pixels count those of the plan's own camera.
+    ///
+    /// # Errors
+    /// As for [`draw_maps`](Self::draw_maps), and if `eye` is not finite.
+    pub fn draw_maps_seen_from(
+        &mut self,
+        eye: DVec3,
+        plan: &Plan,
+        casters: Casters<'_>,
+        timer: Option<&Timer>,
+    ) -> Result<Vec<(usize, Drawn)>, Error> {
         let Self { gpu, scene, shadows, instances, opaque, masked, masks, edge_on, .. } = self;
-        let frame = Frame { plan, render_origin: plan.origin, casters };
+        let frame = Frame { plan, render_origin: eye, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
-        self.eye = plan.origin;
-        instances.begin(scene, plan.origin);
+        self.eye = Some(eye);
+        instances.begin(scene, eye);
         let lists: Vec<DrawList> = prepared
             .stale()
             .map(|redraw| {
@@ -258,14 +282,25 @@ impl<'g, 's> Renderer<'g, 's> {
         target: &FrameTarget,
         timer: Option<&Timer>,
     ) -> Result<Drawn, Error> {
+        self.draw_frame("frame", shading, target, timer)
+    }
+
+    /// Draws a frame by the fragment shaders of this name.
+    pub(crate) fn draw_frame(
+        &mut self,
+        name: &'static str,
+        shading: &Shading<'_>,
+        target: &FrameTarget,
+        timer: Option<&Timer>,
+    ) -> Result<Drawn, Error> {
         let tile = Tile::whole(shading.camera);
-        let pipelines = self.pipelines("frame", &[FRAME_FORMAT]);
+        let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
         let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
-        let FrameTarget { color_view, depth, .. } = target;
-        let color = &[color_view][..];
-        let depth_store = StoreOp::Store;
-        let target = Target { color, depth, depth_store, pipelines: &pipelines };
-        let drawn = self.encode_picture(&mut encoder, shading, &tile, &target, timer)?;
+        let color = &[&target.color_view][..];
+        let (depth, depth_store) = (&target.depth, StoreOp::Store);
+        let parts = Target { color, depth, depth_store, pipelines: &pipelines };
+        let drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
+        target.encode_copy(&mut encoder);
         if let Some(timer) = timer {
             timer.resolve(&mut encoder);
         }
@@ -320,8 +355,10 @@ impl<'g, 's> Renderer<'g, 's> {
         let Self { gpu, scene, instances, .. } = self;
         let Shading { camera, light, light_index } = *shading;
         debug_assert!(
-            self.eye == DVec3::ZERO || self.eye == camera.eye(),
-            "render space is the eye's"
+            self.eye.is_none_or(|eye| eye == camera.eye()),
+            "maps were drawn for a camera at {:?}, not at {}",
+            self.eye,
+            camera.eye()
         );
         let view = ViewUniform::new(camera, light, light_index, tile, scene.farthest(camera));
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
@@ -365,81 +402,44 @@ impl<'g, 's> Renderer<'g, 's> {
     }
 }
 
-/// The uniform buffer for camera and light, with its bind group and the layout of that.
-fn view_bindings(device: &wgpu::Device) -> (Buffer, wgpu::BindGroupLayout, BindGroup) {
-    let buffer = device.create_buffer(&BufferDescriptor {
-        label: Some("view"),
-        size: size_of::<ViewUniform>() as u64,
+fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
+    device.create_buffer(&BufferDescriptor {
+        label: Some(label),
+        size: size_of::<T>() as u64,
         usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
         mapped_at_creation: false,
-    });
+    })
+}
+
+/// The bind group of camera, light and overlay, with its layout.
+fn view_bindings(
+    device: &wgpu::Device,
+    view: &Buffer,
+    overlay: &Buffer,
+) -> (wgpu::BindGroupLayout, BindGroup) {
+    let entry = |binding, visibility| BindGroupLayoutEntry {
+        binding,
+        visibility,
+        ty: BindingType::Buffer {
+            ty: BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    };
     let layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
         label: Some("view"),
-        entries: &[BindGroupLayoutEntry {
-            binding: 0,
-            visibility: ShaderStages::VERTEX_FRAGMENT,
-            ty: BindingType::Buffer {
-                ty: BufferBindingType::Uniform,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        }],
+        entries: &[entry(0, ShaderStages::VERTEX_FRAGMENT), entry(1, ShaderStages::FRAGMENT)],
     });
     let group = device.create_bind_group(&BindGroupDescriptor {
         label: Some("view"),
         layout: &layout,
-        entries: &[BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
+        entries: &[
+            BindGroupEntry { binding: 0, resource: view.as_entire_binding() },
+            BindGroupEntry { binding: 1, resource: overlay.as_entire_binding() },
+        ],
     });
-    (buffer, layout, group)
-}
-
-/// Texture format of the frames to display.
-pub const FRAME_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
-
-/// The textures that frames are drawn into.
-pub struct FrameTarget {
-    color: Texture,
-    color_view: TextureView,
-    depth: TextureView,
-}
-
-impl FrameTarget {
-    /// Makes a target of this width and height, pixels.
-    ///
-    /// # Errors
-    /// The target is larger than the device's largest texture.
-    pub fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Self, Error> {
-        let max = gpu.device().limits().max_texture_dimension_2d;
-        if width > max || height > max {
-            return Err(Error::TooLarge {
-                what: format!("a frame of {width}x{height} pixels"),
-                problem: format!("at most {max} pixels in width and height"),
-            });
-        }
-        let texture = |format, usage| {
-            gpu.device().create_texture(&TextureDescriptor {
-                label: Some("frame"),
-                size: Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: TextureDimension::D2,
-                format,
-                usage: TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let color = texture(FRAME_FORMAT, TextureUsages::COPY_SRC);
-        let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
-        let depth = view(&texture(DEPTH_FORMAT, TextureUsages::TEXTURE_BINDING));
-        gpu.check()?;
-        Ok(Self { color_view: view(&color), color, depth })
-    }
-
-    /// The picture, in sRGB with the format [`FRAME_FORMAT`].
-    pub fn color(&self) -> &Texture {
-        &self.color
-    }
+    (layout, group)
 }
 
 /// The textures that a picture is drawn into, and the pipelines that draw it.
@@ -523,7 +523,7 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 
 /// The forward shader, after the lookup module that it calls.
 fn shader_text(lookup: &str) -> String {
-    format!("{lookup}\n{}", include_str!("wgsl/forward.wgsl"))
+    [lookup, include_str!("wgsl/forward.wgsl"), include_str!("wgsl/overlay.wgsl")].join("\n")
 }
 
 fn pipelines(

@@ -317,9 +317,26 @@ fn masked_texels(in: Fragment) -> @location(0) vec4f {
 }
 
 fn texels(at: vec4f, s: Surface) -> vec4f {
-    let place = shadow_place(view.light_index, s.position);
+    let spread = texel_spread(at, s);
+    let place = spread.place;
     if (place.map == SHADOW_NONE) {
         return vec4f(0.0, 0.0, -1.0, 0.0);
+    }
+    return vec4f(place.texel, f32(shadow_maps[place.map].index), pixels_per_texel(spread));
+}
+
+// The place of a surface point in the maps, and the change of its texel coordinates from pixel to
+// pixel to the right and downwards.
+struct TexelSpread {
+    place: ShadowPlace,
+    right: vec2f,
+    down: vec2f,
+}
+
+fn texel_spread(at: vec4f, s: Surface) -> TexelSpread {
+    let place = shadow_place(view.light_index, s.position);
+    if (place.map == SHADOW_NONE) {
+        return TexelSpread(place, vec2f(0.0), vec2f(0.0));
     }
     let point = shadow_point(place.map, s.position);
     // How the surface point moves on its plane from pixel to pixel.
@@ -328,17 +345,22 @@ fn texels(at: vec4f, s: Surface) -> vec4f {
     let scale = select(dot(view.forward, s.position), 1.0, view.is_orthographic != 0u);
     let step_x = scale * view.grid * (view.ray_x - ray * (dot(s.normal, view.ray_x) / across));
     let step_y = scale * view.grid * (view.ray_y - ray * (dot(s.normal, view.ray_y) / across));
-    // Texels per pixel; then the larger singular value of the inverse.
-    let column_x = vec2f(dot(point.grad_s, step_x), dot(point.grad_t, step_x));
-    let column_y = vec2f(dot(point.grad_s, step_y), dot(point.grad_t, step_y));
-    let xx = dot(column_x, column_x);
-    let yy = dot(column_y, column_y);
-    let xy = dot(column_x, column_y);
+    return TexelSpread(
+        place,
+        vec2f(dot(point.grad_s, step_x), dot(point.grad_t, step_x)),
+        vec2f(dot(point.grad_s, step_y), dot(point.grad_t, step_y)),
+    );
+}
+
+// The larger singular value of the inverse of texels per pixel.
+fn pixels_per_texel(spread: TexelSpread) -> f32 {
+    let xx = dot(spread.right, spread.right);
+    let yy = dot(spread.down, spread.down);
+    let xy = dot(spread.right, spread.down);
     let half_difference = 0.5 * (xx - yy);
     let largest = sqrt(0.5 * (xx + yy) + sqrt(half_difference * half_difference + xy * xy));
-    let determinant = abs(column_x.x * column_y.y - column_x.y * column_y.x);
-    let error = largest / max(determinant, 1e-30);
-    return vec4f(place.texel, f32(shadow_maps[place.map].index), error);
+    let determinant = abs(spread.right.x * spread.down.y - spread.right.y * spread.down.x);
+    return largest / max(determinant, 1e-30);
 }
 
 @fragment

@@ -1,8 +1,10 @@
 //! On a real device, lavapipe where there is no other.
 
+mod overlays;
 mod parity;
 mod pictures;
 mod trouble;
+mod window;
 
 use std::path::Path;
 use std::sync::LazyLock;

@@ -648,3 +648,39 @@ fn a_million_metres_from_the_origin() {
         check("pole", &technique, &difference);
     }
 }
+
+/// Maps stay where they are when the camera moves away from that of their plan, and surfaces that
+/// they do not hold are lit.
+#[needs(gpu)]
+#[test]
+fn another_camera_sees_a_plan() {
+    let scene = scene("town:20");
+    let set = Set::new(&scene, IMAGE);
+    let mut moved = Set::new(&scene, IMAGE);
+    let eye = set.camera.eye() + DVec3::new(7.0, 3.0, -5.0);
+    moved.camera = Camera::look_at(LookAt {
+        eye,
+        target: eye + set.camera.forward() + DVec3::new(0.3, -0.1, 0.2),
+        up: DVec3::Y,
+        fov_y_rad: 0.9,
+        near: set.camera.near(),
+        far: set.camera.far(),
+        image: IMAGE,
+    })
+    .unwrap();
+    let light = set.light();
+    let shading = Shading { camera: &moved.camera, light: &light, light_index: 0 };
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    for (index, filter) in [(1, Filter::Hard), (4, Filter::Pcf { n: 3 }), (6, Filter::Hard)] {
+        let technique = technique(TECHNIQUES[index], filter);
+        let plan = set.plan(&[light], &technique);
+        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+        let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+        let mut renderer = Renderer::new(&GPU, &buffers, &options).unwrap();
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        let again = renderer.draw_maps_seen_from(eye, &plan, Casters::Unmoved, None).unwrap();
+        assert_eq!(again, [], "drawn again for another eye");
+        let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
+        check("moved", &technique, &compare(&moved, &plan, (0, &light), &samples, &reference));
+    }
+}

@@ -7,36 +7,10 @@ use umbrage_scene::{Alpha, Scene};
 use umbrage_testing::needs;
 use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
-use wgpu::{BufferUsages, MapMode, PollType};
 
 /// The sRGB colours of a frame.
 fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
-    let (device, queue, texture) = (GPU.device(), GPU.queue(), target.color());
-    let bytes_per_row = (4 * texture.width()).next_multiple_of(256);
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(bytes_per_row * texture.height()),
-        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let layout = wgpu::TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(bytes_per_row),
-        rows_per_image: None,
-    };
-    let mut encoder = device.create_command_encoder(&Default::default());
-    let copy = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), copy, texture.size());
-    queue.submit([encoder.finish()]);
-    buffer.map_async(MapMode::Read, .., |_| {});
-    device.poll(PollType::wait_indefinitely()).unwrap();
-    let bytes: Vec<u8> = bytemuck::pod_collect_to_vec(&buffer.get_mapped_range(..).unwrap());
-    let rows = bytes.chunks(bytes_per_row as usize);
-    rows.flat_map(|row| {
-        let pixels = row.chunks(4).take(texture.width() as usize);
-        pixels.map(|p| [p[0], p[1], p[2]]).collect::<Vec<_>>()
-    })
-    .collect()
+    target.read(&GPU).unwrap().into_iter().map(|[r, g, b, _]| [r, g, b]).collect()
 }
 
 /// The shader's tone mapping and the texture's encoding agree with those of the reference's

@@ -30,7 +30,7 @@ fn a_lost_device_is_reported() {
     gpu.device().destroy();
     let lost = |e: Error| assert!(matches!(e, Error::Lost(_)), "{e}");
     lost(renderer.samples(&shading, 0..18, 1, true).unwrap_err());
-    lost(renderer.visibility(&plan, 0, &[[set.camera.eye(); 2]]).unwrap_err());
+    lost(renderer.visibility(0, &[[set.camera.eye(); 2]]).unwrap_err());
     renderer.draw_maps(&plan, Casters::Moved, None).map_or_else(lost, drop);
 }
 

@@ -1,0 +1,122 @@
+// Frames that show what the maps do, over the picture or in its place. The text of `forward.wgsl`
+// must precede this one. Colours are mixed by their sRGB values, as the pictures of reports are.
+
+struct Overlay {
+    // ERROR, GRID or PARTITION.
+    kind: u32,
+    // Logarithm of the upper end of the scale of errors, pixels per texel.
+    log_max: f32,
+    // Distance along the view beyond which no shadow counts, metres.
+    far: f32,
+    // sRGB: the scale of errors, or the colour of the lines, or those of the maps.
+    colors: array<vec4f, 65>,
+}
+
+const ERROR: u32 = 0u;
+const GRID: u32 = 1u;
+const PARTITION: u32 = 2u;
+const PARTITION_COLORS: u32 = 7u;
+
+@group(0) @binding(1) var<uniform> overlay: Overlay;
+
+@fragment
+fn opaque_overlay(in: Fragment) -> @location(0) vec4f {
+    return overlaid(in.clip, opaque_surface(in));
+}
+
+@fragment
+fn masked_overlay(in: Fragment) -> @location(0) vec4f {
+    return overlaid(in.clip, masked_surface(in));
+}
+
+@fragment
+fn sky_overlay(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return shown(dimmed(srgb_from_linear(compress(sky(at.xy)))));
+}
+
+fn overlaid(at: vec4f, s: Surface) -> vec4f {
+    let picture = srgb_from_linear(compress(radiance(s)));
+    let spread = texel_spread(at, s);
+    let is_held = is_held(spread.place.map, s.position);
+    if (overlay.kind == ERROR) {
+        let counts = s.is_facing && dot(view.forward, s.position) <= overlay.far;
+        if (!counts) {
+            return shown(dimmed(picture));
+        }
+        return shown(select(hatch(at), scale_color(pixels_per_texel(spread)), is_held));
+    }
+    if (!is_held) {
+        return shown(dimmed(picture));
+    }
+    if (overlay.kind == GRID) {
+        return shown(mix(0.6 * picture, overlay.colors[0].rgb, grid_cover(spread)));
+    }
+    // The tint takes the lightness of the picture, so that the shading stays visible.
+    let tint = overlay.colors[shadow_maps[spread.place.map].index % PARTITION_COLORS].rgb;
+    return shown(tint * (0.25 + 0.75 * luma(picture)));
+}
+
+// Whether a map holds the point that it serves, as `shadow_map_visibility` decides it. Maps that
+// were planned for another camera do not hold all that this one sees.
+fn is_held(map: u32, position: vec3f) -> bool {
+    if (map == SHADOW_NONE) {
+        return false;
+    }
+    let point = shadow_point(map, position);
+    let outside = abs(point.texel - clamp(point.texel, vec2f(0.0), shadow_maps[map].size));
+    return point.w > 0.0
+        && point.depth >= -1e-6
+        && max(outside.x, outside.y) <= shadow_maps[map].rounding;
+}
+
+// The colour of an error on a logarithmic scale from 1/max to max.
+fn scale_color(error: f32) -> vec3f {
+    let position = clamp(log(max(error, 1e-30)) / overlay.log_max, -1.0, 1.0);
+    let at = 32.0 + 32.0 * position;
+    let low = u32(at);
+    let high = min(low + 1u, 64u);
+    return mix(overlay.colors[low].rgb, overlay.colors[high].rgb, fract(at));
+}
+
+fn hatch(at: vec4f) -> vec3f {
+    let stripe = (u32(at.x) + u32(at.y)) / 3u;
+    return vec3f(select(160.0, 90.0, stripe % 2u == 0u) / 255.0);
+}
+
+// How much of a pixel lines cover that lie at every fifth texel in s and in t. Where they would be
+// too dense to see, they fade into a uniform tint.
+fn grid_cover(spread: TexelSpread) -> f32 {
+    let period = 5.0;
+    let width_px = 1.2;
+    let tint = 0.3;
+    // Periods per pixel, along s and along t.
+    let density = sqrt(spread.right * spread.right + spread.down * spread.down) / period;
+    let phase = spread.place.texel / period;
+    let from_line_px = abs(phase - round(phase)) / max(density, vec2f(1e-6));
+    let line = clamp(0.5 * width_px + 0.5 - from_line_px, vec2f(0.0), vec2f(1.0));
+    // Lines begin to fade at a density of 1/6, and have vanished at 1/3.
+    let fade = clamp(6.0 * density - 1.0, vec2f(0.0), vec2f(1.0));
+    let cover = mix(line, vec2f(tint), fade);
+    return max(cover.x, cover.y);
+}
+
+// A darker grey, on which colours stand out.
+fn dimmed(srgb: vec3f) -> vec3f {
+    return vec3f(0.2 * luma(srgb) + 14.0 / 255.0);
+}
+
+// Rec. 709 luma of sRGB values.
+fn luma(srgb: vec3f) -> f32 {
+    return dot(vec3f(0.2126, 0.7152, 0.0722), srgb);
+}
+
+fn srgb_from_linear(linear: vec3f) -> vec3f {
+    let v = clamp(linear, vec3f(0.0), vec3f(1.0));
+    return select(1.055 * pow(v, vec3f(1.0 / 2.4)) - 0.055, 12.92 * v, v <= vec3f(0.0031308));
+}
+
+// The value to write for a colour, which the format of the target encodes as sRGB.
+fn shown(srgb: vec3f) -> vec4f {
+    let curved = pow((srgb + 0.055) / 1.055, vec3f(2.4));
+    return vec4f(select(curved, srgb / 12.92, srgb <= vec3f(0.04045)), 1.0);
+}

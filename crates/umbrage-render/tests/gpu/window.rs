@@ -1,0 +1,101 @@
+//! What a window needs of the renderer.
+
+use crate::{GPU, Set, scene};
+use umbrage::Technique;
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading};
+use umbrage_testing::needs;
+use umbrage_wgpu::{Casters, ShadowOptions};
+use wgpu::{BufferUsages, Instance, InstanceDescriptor, MapMode, PollType};
+
+/// A device that was opened elsewhere is as good as our own.
+#[needs(gpu)]
+#[test]
+fn a_window_brings_its_device() {
+    let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
+    let all = pollster::block_on(instance.enumerate_adapters(GPU.info().backend.into()));
+    let choices = Gpu::choices(&all).unwrap();
+    let adapter = choices.iter().find(|a| a.get_info() == *GPU.info()).expect("the same adapter");
+    let request = adapter.request_device(&Gpu::wanted(adapter));
+    let (device, queue) = pollster::block_on(request).unwrap();
+    let gpu = Gpu::from_device(adapter, device, queue).unwrap();
+    assert_eq!(gpu.support(), GPU.support());
+    assert_eq!(gpu.lost(), None);
+    gpu.device().destroy();
+    gpu.wait().unwrap_err();
+    assert!(gpu.lost().is_some());
+}
+
+/// Shaders that load from the view for windows get the sRGB values that are read back.
+#[needs(gpu)]
+#[test]
+fn a_window_shows_the_bytes_of_the_frame() {
+    let scene = scene("pole");
+    let set = Set::new(&scene, [75, 40]);
+    let light = set.light();
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    let plan = set.plan(&[light], &Technique::default());
+    renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+    let target = FrameTarget::new(&GPU, [75, 40]).unwrap();
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    renderer.frame(&shading, &target, None).unwrap();
+    let read = target.read(&GPU).unwrap();
+    assert_eq!(read.len(), 75 * 40);
+    assert!(read.iter().all(|c| c[3] == 255), "opaque");
+    assert_eq!(loaded(&target), read);
+}
+
+/// The texels of the view for windows, as a shader loads them.
+fn loaded(target: &FrameTarget) -> Vec<[u8; 4]> {
+    const SHADER: &str = "
+        @group(0) @binding(0) var shown: texture_2d<f32>;
+        @group(0) @binding(1) var<storage, read_write> texels: array<u32>;
+        @compute @workgroup_size(1) fn load(@builtin(global_invocation_id) id: vec3u) {
+            let at = id.y * textureDimensions(shown).x + id.x;
+            texels[at] = pack4x8unorm(textureLoad(shown, id.xy, 0));
+        }";
+    let device = GPU.device();
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: None,
+        layout: None,
+        module: &module,
+        entry_point: None,
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    let [width, height] = target.size();
+    let buffer = |usage| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(4 * width * height),
+            usage,
+            mapped_at_creation: false,
+        })
+    };
+    let texels = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+    let readback = buffer(BufferUsages::COPY_DST | BufferUsages::MAP_READ);
+    let shown = wgpu::BindingResource::TextureView(target.shown_view());
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[
+            wgpu::BindGroupEntry { binding: 0, resource: shown },
+            wgpu::BindGroupEntry { binding: 1, resource: texels.as_entire_binding() },
+        ],
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &group, &[]);
+    pass.dispatch_workgroups(width, height, 1);
+    drop(pass);
+    encoder.copy_buffer_to_buffer(&texels, 0, &readback, 0, readback.size());
+    GPU.queue().submit([encoder.finish()]);
+    readback.map_async(MapMode::Read, .., |_| {});
+    device.poll(PollType::wait_indefinitely()).unwrap();
+    bytemuck::pod_collect_to_vec(&readback.get_mapped_range(..).unwrap())
+}
