@@ -1,9 +1,12 @@
 //! Techniques: which shadow maps a plan has, how they are warped and how they are looked up.
 
 mod code;
+mod completion;
+mod edits;
 mod filters;
 pub mod language;
 mod layouts;
+mod scale;
 
 use crate::error::{Error, check};
 use crate::plan::Face;

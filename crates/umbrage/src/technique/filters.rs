@@ -1,14 +1,20 @@
 //! The language's words for filters.
 
 use super::language::{Kind, ParseError, Short, Word, WordOption, Written, count, write_word};
+use super::scale::Scale;
 use crate::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Storage, Vsm};
 use crate::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use std::fmt;
 use std::str::FromStr;
 
+const ODD_TEXELS: Scale = Scale { step: 2.0, ..Scale::whole(1.0, Prefilter::MAX_BLUR as f64) };
+const PIXELS: Scale = Scale::ratios("px", 0.25, 32.0);
+const ACROSS: Scale = Scale::ratios("m", 0.005, 5.0);
+
 const WIDTH: WordOption = WordOption {
     name: "blur",
     value: "WIDTH",
+    scales: &[PIXELS, ACROSS],
     example: "blur=2px",
     meaning: "N×N comparisons over this width, in pixels of the picture (2px) or in metres across the \
               light (0.3m): the same near and far, under any warp and in every slice.",
@@ -16,6 +22,7 @@ const WIDTH: WordOption = WordOption {
 const BLUR: WordOption = WordOption {
     name: "blur",
     value: "WIDTH",
+    scales: &[ODD_TEXELS, PIXELS, ACROSS],
     example: "blur=7",
     meaning: "A Gaussian this wide: an odd number of texels (7), blurred ahead of lookup; or pixels of \
               the picture (2px) or metres across the light (0.3m), the same near and far.",
@@ -23,12 +30,14 @@ const BLUR: WordOption = WordOption {
 const HALF: WordOption = WordOption {
     name: "half",
     value: "",
+    scales: &[],
     example: "half",
     meaning: "Stored at half the map's resolution: a quarter of the memory, and of the blur's work.",
 };
 const LEAK: WordOption = WordOption {
     name: "leak",
     value: "SHARE",
+    scales: &[Scale::even(0.0, 0.99)],
     example: "leak=0.2",
     meaning: "Takes visibilities below this for shadow and stretches the rest, against light that \
               leaks.",
@@ -36,6 +45,7 @@ const LEAK: WordOption = WordOption {
 const EXPONENT: WordOption = WordOption {
     name: "exponent",
     value: "NUMBER",
+    scales: &[Scale::ratios("", 1.0, Evsm::MAX_EXPONENT as f64)],
     example: "exponent=30",
     meaning: "How steep the exponentials are.",
 };
@@ -47,6 +57,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: NONE,
         value: "",
+        scales: &[],
         example: NONE,
         options: &[],
         meaning: "No shadows and no maps: the frame to which a technique's cost is the difference. \
@@ -55,6 +66,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "hard",
         value: "",
+        scales: &[],
         example: "hard",
         options: &[],
         meaning: "One comparison with the nearest texel.",
@@ -62,12 +74,14 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "pcf",
         value: "N",
+        scales: &[Scale::whole(1.0, Filter::MAX_PCF as f64)],
         example: "pcf3",
         options: &[
             WIDTH,
             WordOption {
                 name: "poisson",
                 value: "",
+                scales: &[],
                 example: "blur=2px,poisson",
                 meaning: "The comparisons of a `blur` at scattered places in a disc, not on a grid.",
             },
@@ -77,11 +91,13 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "pcss",
         value: "",
+        scales: &[],
         example: "pcss",
         options: &[
             WordOption {
                 name: "light",
                 value: "SIZE",
+                scales: &[Scale::ratios("deg", 0.05, 20.0), Scale::ratios("m", 0.005, 10.0)],
                 example: "light=2deg",
                 meaning: "How large the light is: the angle of a sun (0.53deg, ours) or the diameter of \
                           a lamp (0.2m).",
@@ -89,6 +105,7 @@ pub(super) const WORDS: &[Word] = &[
             WordOption {
                 name: "samples",
                 value: "N",
+                scales: &[Scale::whole(1.0, Filter::MAX_DISC as f64)],
                 example: "samples=4",
                 meaning: "N×N comparisons for the blockers, and as many for the penumbra; 6 if not told.",
             },
@@ -99,6 +116,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "vsm",
         value: "",
+        scales: &[],
         example: "vsm",
         options: &[BLUR, LEAK, HALF],
         meaning: "Variance shadow maps: mean and mean square of depth, blurred ahead of lookup \
@@ -107,14 +125,20 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "esm",
         value: "",
+        scales: &[],
         example: "esm",
-        options: &[BLUR, EXPONENT, HALF],
+        options: &[
+            BLUR,
+            WordOption { scales: &[Scale::ratios("", 1.0, Esm::MAX_EXPONENT as f64)], ..EXPONENT },
+            HALF,
+        ],
         meaning: "Exponential shadow maps: an exponential of depth, blurred ahead of lookup (Annen et \
                   al. 2008).",
     },
     Word {
         name: "evsm",
         value: "",
+        scales: &[],
         example: "evsm",
         options: &[BLUR, LEAK, EXPONENT, HALF],
         meaning: "Exponential variance shadow maps: moments of two exponentials of depth, blurred ahead of \
@@ -123,6 +147,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "evsm2",
         value: "",
+        scales: &[],
         example: "evsm2",
         options: &[BLUR, LEAK, EXPONENT, HALF],
         meaning: "Exponential variance shadow maps with one exponential: half the memory, more light leaks.",
@@ -130,6 +155,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "msm",
         value: "",
+        scales: &[],
         example: "msm",
         options: &[BLUR, LEAK, HALF],
         meaning: "Moment shadow maps: four moments of depth, blurred ahead of lookup (Peters and Klein \
@@ -138,6 +164,7 @@ pub(super) const WORDS: &[Word] = &[
     Word {
         name: "csm",
         value: "M",
+        scales: &[Scale::whole(1.0, Csm::MAX_ORDER as f64)],
         example: "csm4",
         options: &[
             BLUR,
@@ -149,18 +176,21 @@ pub(super) const WORDS: &[Word] = &[
             WordOption {
                 name: "attenuation",
                 value: "NUMBER",
+                scales: &[Scale::even(0.0, 10.0)],
                 example: "attenuation=1",
                 meaning: "Damps the higher terms of the series, against ringing.",
             },
             WordOption {
                 name: "offset",
                 value: "",
+                scales: &[],
                 example: "offset",
                 meaning: "Looks up a little nearer the light, so that lit surfaces are bright.",
             },
             WordOption {
                 name: "scale",
                 value: "",
+                scales: &[],
                 example: "offset,scale",
                 meaning: "Doubles the series, so that lit surfaces are bright: what is done if neither \
                           is told.",
@@ -168,12 +198,14 @@ pub(super) const WORDS: &[Word] = &[
             WordOption {
                 name: "raw",
                 value: "",
+                scales: &[],
                 example: "raw",
                 meaning: "Neither: lit surfaces come out half as bright.",
             },
             WordOption {
                 name: "bits",
                 value: "16",
+                scales: &[Scale::whole(16.0, 16.0)],
                 example: "bits=16",
                 meaning: "Stores each statistic in 16 bits in place of 8.",
             },

@@ -3,7 +3,27 @@
 //! [`Technique`] parses and prints this language. Each word stands in one of four tables, with its
 //! options and a sentence about each. The parser, the printer's tests, [`help`] and the
 //! explanations in reports all use these tables.
+//!
+//! Two things help to write it, from the same tables. [`complete`] says what may stand at the cursor
+//! of a text field. A panel of controls needs no state beside the text: [`written`] tells what the
+//! text has in each [`Slot`], and [`with_word`] and [`with_option`] change it there. The parser
+//! decides which changes are possible, so a panel can try them to know what to grey out.
+//!
+//! ```
+//! use umbrage::language::{Slot, complete, with_option, with_word, written};
+//!
+//! assert_eq!(complete("adaptive:ms", 11)[0].text, "adaptive:msm");
+//! let text = with_word("adaptive:vsm(blur=7)", Slot::Filter, Some("msm"))?;
+//! let text = with_option(&text, Slot::Filter, "blur", Some("2px"))?;
+//! assert_eq!(text, "adaptive:msm(blur=2px)");
+//! assert_eq!(written(&text, Slot::Filter).unwrap().value_of("blur"), Some("2px"));
+//! assert!(with_word("uniform(stable)", Slot::Faces, Some("face")).is_err());
+//! # Ok::<(), umbrage::language::ParseError>(())
+//! ```
 
+pub use super::completion::{Completion, complete};
+pub use super::edits::{Slot, with_option, with_word, written};
+pub use super::scale::Scale;
 use super::{Size, Technique, filters, layouts};
 use crate::visibility::Filter;
 use std::fmt::{self, Display, LowerExp, Write};
@@ -20,13 +40,16 @@ pub static FILTERS: &[Word] = filters::WORDS;
 pub static SIZES: &[Word] = &layouts::SIZES;
 
 /// A word of the language, with its value and options.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Word {
     /// The word without its value: `pcf`.
     pub name: &'static str,
     /// Placeholder of the value that follows the name without a space: `N` in `pcfN`, `=NUMBER` in
     /// `lambda=NUMBER`. Empty for words without a value.
     pub value: &'static str,
+    /// Numbers that a control offers for the value, one scale for each unit that it may have. Empty
+    /// for words without one. Where the value is a pair or a list, they are for each of its numbers.
+    pub scales: &'static [Scale],
     /// The word with a valid value: `pcf3`.
     pub example: &'static str,
     /// The options that may follow the word in parentheses, separated by commas.
@@ -36,13 +59,15 @@ pub struct Word {
 }
 
 /// An option of a [`Word`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WordOption {
     /// The option's name: `blur`.
     pub name: &'static str,
     /// Placeholder of the option's value: `WIDTH` in `blur=WIDTH`. Empty for options without a
     /// value.
     pub value: &'static str,
+    /// Numbers that a control offers for the value, as for a [`Word`].
+    pub scales: &'static [Scale],
     /// The option with a valid value: `blur=2px`.
     pub example: &'static str,
     /// The option's meaning in one sentence.
@@ -116,7 +141,10 @@ pub fn help() -> String {
         for word in words {
             paragraph(&mut page, 2, &format!("{prefix}{word}"), word.meaning);
             for option in word.options {
-                let first = told.iter().find(|(known, _)| *known == option).map(|(_, word)| word);
+                let is_same = |known: &WordOption| {
+                    (known.name, known.meaning) == (option.name, option.meaning)
+                };
+                let first = told.iter().find(|(known, _)| is_same(known)).map(|(_, word)| word);
                 let meaning = first.map(|word| format!("As for {prefix}{word}."));
                 let meaning = meaning.as_deref().unwrap_or(option.meaning);
                 paragraph(&mut page, 6, &format!("({option})"), meaning);
@@ -181,16 +209,16 @@ pub fn explain(text: &str) -> Vec<(String, &'static str)> {
 }
 
 /// A technique's text, split into its parts.
-struct Parts<'a> {
+pub(super) struct Parts<'a> {
     /// `None` if the text is the filter `none` alone.
-    warp: Option<&'a str>,
-    partitions: Vec<&'a str>,
-    filter: Option<&'a str>,
-    size: Option<&'a str>,
+    pub(super) warp: Option<&'a str>,
+    pub(super) partitions: Vec<&'a str>,
+    pub(super) filter: Option<&'a str>,
+    pub(super) size: Option<&'a str>,
 }
 
 impl<'a> Parts<'a> {
-    fn of(text: &'a str) -> Self {
+    pub(super) fn of(text: &'a str) -> Self {
         if text == filters::NONE {
             return Self { warp: None, partitions: Vec::new(), filter: Some(text), size: None };
         }
@@ -305,14 +333,17 @@ impl Kind {
 }
 
 /// A word as written in a text, with its value and options, all found in the tables.
-pub(super) struct Written<'a> {
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Written<'a> {
     /// The whole word, including its options.
-    pub(super) text: &'a str,
-    pub(super) word: &'static Word,
-    /// The word's own value, without an `=`.
-    pub(super) value: &'a str,
+    pub text: &'a str,
+    /// The word in its table.
+    pub word: &'static Word,
+    /// The word's own value, without an `=`. A size is its own value.
+    pub value: &'a str,
     /// The options with their values, which are empty for options without a value.
-    options: Vec<(&'static WordOption, &'a str)>,
+    pub options: Vec<(&'static WordOption, &'a str)>,
 }
 
 impl<'a> Written<'a> {
@@ -348,14 +379,18 @@ impl<'a> Written<'a> {
         Ok(Self { text, word, value, options })
     }
 
+    /// A size, which has no options.
+    pub(super) fn size(text: &'a str) -> Self {
+        Self { text, word: layouts::size_word(text), value: text, options: Vec::new() }
+    }
+
     /// Whether the option is given.
     pub(super) fn has(&self, name: &str) -> bool {
         self.value_of(name).is_some()
     }
 
-    /// The option's value, if the option is given.
-    pub(super) fn value_of(&self, name: &str) -> Option<&'a str> {
-        debug_assert!(self.word.options.iter().any(|o| o.name == name), "{name}");
+    /// The value of the option of this name, if it is given; empty for options without a value.
+    pub fn value_of(&self, name: &str) -> Option<&'a str> {
         self.options.iter().find(|(option, _)| option.name == name).map(|(_, value)| *value)
     }
 
@@ -423,7 +458,7 @@ fn read_options<'a>(
 }
 
 /// Splits `name(options)` into both parts.
-fn split_options(text: &str) -> Result<(&str, Option<&str>), ParseError> {
+pub(super) fn split_options(text: &str) -> Result<(&str, Option<&str>), ParseError> {
     match split_once(text, '(') {
         (name, None) if name.contains(')') => {
             Err(ParseError::new(format!("`{text}` has a `)` without its `(`")))

@@ -3,14 +3,19 @@
 use super::language::{
     FILTERS, Kind, ParseError, Short, Word, WordOption, Written, count, split_once, write_word,
 };
+use super::scale::Scale;
 use super::{Cover, Faces, MAX_SIDE, Objective, Partition, Size, Splits, Warp};
 use std::fmt::{self, Write};
 use std::str::FromStr;
+
+const METRES: Scale = Scale::ratios("", 0.01, 1000.0);
+const SIDE: Scale = Scale { step: 1.0, ..Scale::ratios("", 64.0, 8192.0) };
 
 pub(super) const WARPS: &[Word] = &[
     Word {
         name: "unfocused",
         value: "",
+        scales: &[],
         example: "unfocused",
         options: &[],
         meaning: "An even map over the whole scene, whatever the camera sees.",
@@ -18,10 +23,12 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "uniform",
         value: "",
+        scales: &[],
         example: "uniform",
         options: &[WordOption {
             name: "stable",
             value: "",
+            scales: &[],
             example: "stable",
             meaning: "Covers all that the camera may turn to, so that texels keep their places in the \
                       world and shadows do not shimmer.",
@@ -31,6 +38,7 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "psm",
         value: "",
+        scales: &[],
         example: "psm",
         options: &[],
         meaning: "A perspective shadow map: drawn in the viewer's own perspective (Stamminger and \
@@ -39,6 +47,7 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "lispsm",
         value: "",
+        scales: &[],
         example: "lispsm",
         options: &[],
         meaning: "A light space perspective shadow map: a perspective warp along the view, whose \
@@ -47,10 +56,12 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "tsm",
         value: "",
+        scales: &[],
         example: "tsm",
         options: &[WordOption {
             name: "focus",
             value: "METRES",
+            scales: &[METRES],
             example: "focus=5",
             meaning: "The focus distance along the view; without it √(n f) of the receivers seen.",
         }],
@@ -60,10 +71,12 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "adaptive",
         value: "",
+        scales: &[],
         example: "adaptive",
         options: &[WordOption {
             name: "area",
             value: "",
+            scales: &[],
             example: "area",
             meaning: "Makes the largest texel on screen smallest instead.",
         }],
@@ -73,6 +86,7 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "log",
         value: "",
+        scales: &[],
         example: "log",
         options: &[],
         meaning: "Logarithmic rows of texels: the ideal that no GPU rasterises, for comparison on the \
@@ -81,6 +95,7 @@ pub(super) const WARPS: &[Word] = &[
     Word {
         name: "lambda",
         value: "=NUMBER",
+        scales: &[METRES],
         example: "lambda=12.5",
         options: &[],
         meaning: "A perspective warp with this distance λ, metres, from its centre of projection to \
@@ -92,29 +107,34 @@ pub(super) const PARTITIONS: &[Word] = &[
     Word {
         name: "z",
         value: "K",
+        scales: &[Scale::whole(1.0, Partition::MAX_SLICES as f64)],
         example: "z4",
         options: &[
             WordOption {
                 name: "fitted",
                 value: "",
+                scales: &[],
                 example: "fitted",
                 meaning: "Slices that all need as many texels for the same error.",
             },
             WordOption {
                 name: "practical",
                 value: "BLEND",
+                scales: &[Scale::even(0.0, 1.0)],
                 example: "practical=0.5",
                 meaning: "Slices between even ones (0) and self-similar ones (1).",
             },
             WordOption {
                 name: "at",
                 value: "METRES/METRES",
+                scales: &[METRES],
                 example: "at=5/20/60",
                 meaning: "Slices that meet at these distances along the view.",
             },
             WordOption {
                 name: "overlap",
                 value: "SHARE",
+                scales: &[Scale::even(0.0, 1.0)],
                 example: "overlap=0.1",
                 meaning: "Each slice fades into the next one over this share of its length.",
             },
@@ -125,10 +145,12 @@ pub(super) const PARTITIONS: &[Word] = &[
     Word {
         name: "face",
         value: "",
+        scales: &[],
         example: "face",
         options: &[WordOption {
             name: "sides",
             value: "",
+            scales: &[],
             example: "sides",
             meaning: "Maps for the four sides alone.",
         }],
@@ -140,6 +162,7 @@ pub(super) static SIZES: [Word; 4] = [
     Word {
         name: "TEXELS",
         value: "",
+        scales: &[SIDE],
         example: "2048",
         options: &[],
         meaning: "A budget of TEXELS² texels for all maps, shared among them and between their sides \
@@ -148,6 +171,7 @@ pub(super) static SIZES: [Word; 4] = [
     Word {
         name: "WxH",
         value: "",
+        scales: &[SIDE],
         example: "800x600",
         options: &[],
         meaning: "Every map has exactly this width and height, texels.",
@@ -155,6 +179,7 @@ pub(super) static SIZES: [Word; 4] = [
     Word {
         name: "PIXELSpx",
         value: "",
+        scales: &[Scale::ratios("px", 0.1, 16.0)],
         example: "1px",
         options: &[],
         meaning: "The fewest texels with which none gets wider than this many pixels, before any \
@@ -163,14 +188,15 @@ pub(super) static SIZES: [Word; 4] = [
     Word {
         name: "NUMBERtexels",
         value: "",
+        scales: &[Scale { step: 1.0, ..Scale::ratios("texels", 4096.0, 67_108_864.0) }],
         example: "3000000texels",
         options: &[],
         meaning: "A budget that is not the square of a whole number.",
     },
 ];
 
-/// The warp in suggestions for a text that is only a filter.
-const DEFAULT_WARP: &str = "adaptive";
+/// The warp of a text that is only a filter.
+pub(super) const DEFAULT_WARP: &str = "adaptive";
 
 pub(super) fn read_warp(text: &str) -> Result<(Warp, Cover), ParseError> {
     if text.is_empty() {
@@ -316,6 +342,12 @@ fn read_slices(written: &Written<'_>) -> Result<Partition, ParseError> {
     })
 }
 
+/// Valid distances at which `slices` slices meet, for messages and controls.
+pub(super) fn example_distances(slices: u32) -> String {
+    let distances: Vec<String> = (1..slices).map(|i| (5 * i).to_string()).collect();
+    distances.join("/")
+}
+
 /// Parses the distances at which `slices` slices meet, metres, separated by slashes.
 fn read_distances(text: &str, slices: u32) -> Result<Splits, ParseError> {
     let wanted = slices as usize - 1;
@@ -330,12 +362,11 @@ fn read_distances(text: &str, slices: u32) -> Result<Splits, ParseError> {
             && d.windows(2).all(|w| w[0] < w[1])
     };
     let parsed = parsed.filter(is_good).ok_or_else(|| {
-        let example: Vec<String> = (1..slices).map(|i| (5 * i).to_string()).collect();
         let plural = if wanted == 1 { "" } else { "s" };
         ParseError::new(format!(
             "`at={text}` must have {wanted} ascending number{plural} of metres, where the {slices} \
              slices meet, as in `at={}`",
-            example.join("/")
+            example_distances(slices)
         ))
     })?;
     let mut distances = [0.0; Partition::MAX_SLICES - 1];
