@@ -107,8 +107,8 @@ impl<'a> Scout<'a> {
     /// # Errors
     /// An error if the GPU has no compute shaders.
     pub fn new(gpu: &'a Gpu, buffers: &'a SceneBuffers<'a>) -> Result<Self, Error> {
-        let readback = SeenReadback::new(gpu.device(), &gpu.support())
-            .map_err(umbrage_render::Error::from)?;
+        let readback =
+            SeenReadback::new(gpu.device(), &gpu.support()).map_err(umbrage_render::Error::from)?;
         let renderer = Renderer::new(gpu, buffers, &ShadowOptions::default())?;
         Ok(Self { gpu, renderer, target: None, readback })
     }

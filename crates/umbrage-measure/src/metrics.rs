@@ -228,9 +228,7 @@ fn differences<'a>(
     counted: &'a Image<bool>,
 ) -> impl Iterator<Item = Option<f32>> + 'a {
     let pairs = truth.pixels().iter().zip(technique.pixels());
-    pairs
-        .zip(counted.pixels())
-        .map(|((&t, &v), &counted)| counted.then(|| difference(t, v)))
+    pairs.zip(counted.pixels()).map(|((&t, &v), &counted)| counted.then(|| difference(t, v)))
 }
 
 /// How much lighter a pixel is than the truth, −1 to 1.

@@ -1,1 +1,5 @@
 //! The window.
+
+mod pose;
+mod stage;
+mod sun;

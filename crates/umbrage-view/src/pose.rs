@@ -40,7 +40,10 @@ impl Pose {
 
     /// The direction to the right in the picture, a unit vector.
     pub fn right(&self) -> DVec3 {
-        self.forward().cross(self.up).try_normalize().unwrap_or_else(|| self.up.any_orthonormal_vector())
+        self.forward()
+            .cross(self.up)
+            .try_normalize()
+            .unwrap_or_else(|| self.up.any_orthonormal_vector())
     }
 
     /// Turns the head: to the right and upwards, radians.

@@ -51,7 +51,9 @@ mod tests {
 
     #[test]
     fn angles_and_directions_are_inverse() {
-        for (azimuth_deg, elevation_deg) in [(0.0, 5.0), (90.0, 45.0), (225.0, 80.0), (359.0, -10.0)] {
+        for (azimuth_deg, elevation_deg) in
+            [(0.0, 5.0), (90.0, 45.0), (225.0, 80.0), (359.0, -10.0)]
+        {
             let sun = Sun { azimuth_deg, elevation_deg };
             let again = Sun::from_direction(sun.direction());
             assert!((again.azimuth_deg - azimuth_deg).abs() < 1e-9, "{again:?}");

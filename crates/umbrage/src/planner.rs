@@ -2,7 +2,7 @@ use crate::bounds::{Aabb, Bounds, Plane};
 use crate::box_tree::BoxTree;
 use crate::camera::Camera;
 use crate::error::{Error, check};
-use crate::focus::{Body, frustum_planes, thickened};
+use crate::focus::{Body, CellView, frustum_planes, thickened};
 use crate::light::{Light, Projector};
 use crate::partition::{self, Along};
 use crate::plan::{Fade, Part, Plan, PlannedLight, ShadowMap};
@@ -13,6 +13,7 @@ use crate::visibility::Filter;
 use crate::warp::theta;
 use draft::{Draft, Drafting};
 use finish::Finishing;
+use glam::DVec3;
 use opening::Opening;
 use slices::Slicing;
 
@@ -211,6 +212,15 @@ impl Planner {
     /// is for measuring what a plan costs when everything has changed.
     pub fn forget(&mut self) {
         self.last.view = None;
+    }
+
+    /// The edges of body B of the last plan (Wimmer et al. 2004, §3.3): what its camera sees of the
+    /// receivers, as convex cells, whichever light shines there. Pairs of points in world space,
+    /// metres. For pictures that show what maps were fitted to.
+    pub fn seen_edges(&self) -> impl Iterator<Item = [DVec3; 2]> {
+        let view = &self.bodies.view;
+        let to_world = |vertex: usize| view.vertices()[vertex] + self.plan.origin;
+        view.cells().flat_map(CellView::edges).map(move |ends| ends.map(to_world))
     }
 
     /// The texture sizes that the device allows.

@@ -197,3 +197,41 @@ fn fewer_parts_leave_more_space() {
         assert!(error.starts_with("most_parts"), "{error}");
     }
 }
+
+/// A box in full view has its own twelve edges, and one that the picture's side cuts ends there.
+#[test]
+fn the_edges_seen_are_those_of_the_boxes_within_the_view() {
+    let camera = umbrage::Camera::look_at(umbrage::LookAt {
+        eye: DVec3::new(1e6, 2.0, 0.0),
+        target: DVec3::new(1e6, 2.0, -10.0),
+        up: DVec3::Y,
+        fov_y_rad: std::f64::consts::FRAC_PI_2,
+        near: 0.1,
+        far: 100.0,
+        image: [64, 64],
+    })
+    .unwrap();
+    let light = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) };
+    let edges = |min: [f64; 3], max: [f64; 3]| -> Vec<[DVec3; 2]> {
+        let offset = DVec3::X * 1e6;
+        let parts = [Aabb::new(DVec3::from(min) + offset, DVec3::from(max) + offset)];
+        let tree = tree(&parts);
+        let bounds = Bounds {
+            receivers: Some(tree.bounds()),
+            receiver_parts: Some(&tree),
+            ..Bounds::default()
+        };
+        let mut planner = planner();
+        planner.plan(&camera, &[light], &bounds, &Technique::default()).unwrap();
+        planner.seen_edges().map(|ends| ends.map(|p| p - offset)).collect()
+    };
+    let whole = edges([-1.0, 1.0, -8.0], [1.0, 3.0, -6.0]);
+    assert_eq!(whole.len(), 12);
+    assert!(whole.iter().all(|[a, b]| (a.distance(*b) - 2.0).abs() < 1e-5), "{whole:?}");
+    // The right side of the picture runs through (x, −x).
+    let cut = edges([0.0, 1.0, -8.0], [20.0, 3.0, -6.0]);
+    let farthest = cut.iter().flatten().map(|p| p.x).fold(0.0, f64::max);
+    assert!((farthest - 8.0).abs() < 1e-5, "{farthest}");
+    assert!(cut.iter().flatten().all(|p| p.x <= -p.z + 1e-5));
+    assert!(edges([50.0, 1.0, -8.0], [60.0, 3.0, -6.0]).is_empty());
+}

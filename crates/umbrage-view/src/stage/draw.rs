@@ -5,7 +5,6 @@ use super::mailbox::Mailbox;
 use super::request::{Costs, DrawnPicture, Frame, Picture, Request, Shining};
 use super::truth::{SharedTruth, TruthJob};
 use super::{News, Reporter};
-use glam::DVec3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -42,7 +41,6 @@ pub(super) struct Artist<'a> {
     scout: Option<Scout<'a>>,
     /// The last frame, and whether its truth and errors were asked for.
     last: Option<(Arc<Frame>, bool)>,
-    body: (Option<Camera>, Arc<Vec<[DVec3; 2]>>),
 }
 
 /// What draws one of a frame's pictures.
@@ -69,9 +67,8 @@ struct Targets(Vec<Arc<FrameTarget>>);
 
 impl Targets {
     fn free(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<Arc<FrameTarget>, String> {
-        let size_of = |t: &FrameTarget| [t.color().width(), t.color().height()];
-        self.0.retain(|target| size_of(target) == size || Arc::strong_count(target) > 1);
-        let free = self.0.iter().find(|t| Arc::strong_count(t) == 1 && size_of(t) == size);
+        self.0.retain(|target| target.size() == size || Arc::strong_count(target) > 1);
+        let free = self.0.iter().find(|t| Arc::strong_count(t) == 1 && t.size() == size);
         if let Some(target) = free {
             return Ok(Arc::clone(target));
         }
@@ -96,11 +93,15 @@ impl<'a> Artist<'a> {
             reporter,
             frames,
             easels: Vec::new(),
-            bare: Bare { renderer: None, targets: Targets::default(), timer: Timer::new(gpu), ms: None },
+            bare: Bare {
+                renderer: None,
+                targets: Targets::default(),
+                timer: Timer::new(gpu),
+                ms: None,
+            },
             receivers: Vec::new(),
             scout: None,
             last: None,
-            body: Default::default(),
         })
     }
 
@@ -133,7 +134,12 @@ impl<'a> Artist<'a> {
             pictures.push(Picture { technique: technique.clone(), drawn });
         }
         let map = request.map.and_then(|map| self.map(map));
-        let body = self.body(&request, seen.as_ref());
+        let body = match request.planned_for {
+            Some(_) => {
+                self.easels.first().map_or_else(Vec::new, |e| e.planner.seen_edges().collect())
+            }
+            None => Vec::new(),
+        };
         finish(self.gpu);
         for (easel, picture) in self.easels.iter_mut().zip(&mut pictures) {
             easel.read_times(self.gpu);
@@ -180,9 +186,14 @@ impl<'a> Artist<'a> {
         let text = |e: umbrage_render::Error| e.to_string();
         renderer.leave_out(edge_on(&plan, tracer));
         let eye = request.camera.eye();
-        let maps = renderer.draw_maps(&plan, eye, Casters::Unmoved, timer).map_err(text)?;
+        let maps =
+            renderer.draw_maps_seen_from(eye, &plan, Casters::Unmoved, timer).map_err(text)?;
         let shading = Shading { camera: &request.camera, light, light_index: 0 };
-        let picture = renderer.frame(&shading, &target, request.overlay.map(Into::into), timer).map_err(text)?;
+        let picture = match request.overlay {
+            None => renderer.frame(&shading, &target, timer),
+            Some(overlay) => renderer.frame_with(&overlay.colors(), &shading, &target, timer),
+        };
+        let picture = picture.map_err(text)?;
         let costs = Costs {
             plan_ms,
             texels: plan.texels(),
@@ -223,18 +234,6 @@ impl<'a> Artist<'a> {
         Some(target)
     }
 
-    /// The edges of body B if it is seen from outside.
-    fn body(&mut self, request: &Request, seen: Option<&SeenTiles>) -> Arc<Vec<[DVec3; 2]>> {
-        if self.body.0 != request.planned_for {
-            let receivers = receivers(&mut self.receivers, self.prepared, request.fit);
-            let edges = request.planned_for.map(|camera| {
-                umbrage::seen_edges(&camera, &receivers.bounds(seen)).unwrap_or_default()
-            });
-            self.body = (request.planned_for, Arc::new(edges.unwrap_or_default()));
-        }
-        Arc::clone(&self.body.1)
-    }
-
     /// Measures the time of a picture without lookups.
     fn measure_bare(&mut self, camera: &Camera, light: &Light) {
         let (gpu, buffers) = (self.gpu, self.buffers);
@@ -249,8 +248,8 @@ impl<'a> Artist<'a> {
         let plan = Plan { origin: camera.eye(), filter: Filter::None, ..Plan::default() };
         let shading = Shading { camera, light, light_index: 0 };
         let drawn = renderer
-            .draw_maps(&plan, camera.eye(), Casters::Unmoved, None)
-            .and_then(|_| renderer.frame(&shading, &target, None, Some(timer)));
+            .draw_maps(&plan, Casters::Unmoved, None)
+            .and_then(|_| renderer.frame(&shading, &target, Some(timer)));
         if drawn.is_ok() {
             finish(gpu);
             bare.ms = timer.try_read(gpu).map(|times| times.picture_ms).or(bare.ms);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
-use umbrage::visibility::LightSize;
+use umbrage::visibility::{Filter, LightSize};
 use umbrage::{Camera, Light, Plan};
 use umbrage_lab::{
     Bencher, NamedTechnique, PreparedScene, Rows, edge_on, milliseconds, plan, plan_fading,
@@ -118,7 +118,8 @@ impl Worker<'_, '_> {
         trace(tracer, &job, self.is_given_up, &grew)?;
         let view = View::new(tracer, camera, light, 1).map_err(|e| e.to_string())?;
         let none = "none".parse().map_err(|e: umbrage_lab::TechniqueError| e.to_string())?;
-        let bare_ms = self.frame_ms(&none, &view, &Plan { origin: camera.eye(), filter: umbrage::visibility::Filter::None, ..Plan::default() })?;
+        let no_maps = Plan { origin: camera.eye(), filter: Filter::None, ..Plan::default() };
+        let bare_ms = self.frame_ms(&none, &view, &no_maps)?;
         for (i, technique) in techniques.iter().enumerate() {
             if (self.is_given_up)() {
                 return Err("the scene was closed".into());
@@ -165,7 +166,12 @@ impl Worker<'_, '_> {
     }
 
     /// The time of a frame with all its maps, milliseconds: the least of several.
-    fn frame_ms(&self, technique: &NamedTechnique, view: &View<'_>, plan: &Plan) -> Result<f64, String> {
+    fn frame_ms(
+        &self,
+        technique: &NamedTechnique,
+        view: &View<'_>,
+        plan: &Plan,
+    ) -> Result<f64, String> {
         const FRAMES: u32 = 4;
         let (render, receivers) = (self.prepared.render(), self.prepared.receivers());
         let size = view.camera().image();
@@ -209,9 +215,9 @@ impl Worker<'_, '_> {
             let bounds = self.prepared.receivers().bounds(None);
             let plan = plan_fading(technique, camera, light, &bounds).map_err(|e| e.to_string())?;
             renderer.leave_out(edge_on(&plan, tracer));
-            renderer.draw_maps(&plan, camera.eye(), Casters::Unmoved, None).map_err(text)?;
+            renderer.draw_maps(&plan, Casters::Unmoved, None).map_err(text)?;
             let shading = Shading { camera, light, light_index: 0 };
-            renderer.frame(&shading, &target, None, None).map_err(text)?;
+            renderer.frame(&shading, &target, None).map_err(text)?;
             write(gpu, &target, &folder.join(format!("turntable_{i:03}.png")))?;
         }
         Ok(format!("saved {} pictures in {}", cameras.len(), folder.display()))
@@ -221,7 +227,7 @@ impl Worker<'_, '_> {
 fn write(gpu: &Gpu, target: &FrameTarget, path: &Path) -> Result<(), String> {
     let pixels = target.read(gpu).map_err(|e| e.to_string())?;
     let opaque = pixels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
-    let size = [target.color().width(), target.color().height()];
+    let size = target.size();
     let image = Image::new(size, opaque).map_err(|e| e.to_string())?;
     umbrage_measure::write_png(path, &image).map_err(|e| e.to_string())
 }

@@ -18,9 +18,9 @@ pub(crate) use scene::SceneToOpen;
 pub(crate) use truth::{SharedTruth, TruthPicture};
 
 use mailbox::Mailbox;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::Arc;
 use umbrage_render::Gpu;
 
 /// What the threads tell the window.

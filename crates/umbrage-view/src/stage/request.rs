@@ -1,12 +1,13 @@
 //! What the window asks the stage for, and what it gets.
 
 use glam::DVec3;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use umbrage::visibility::LightSize;
 use umbrage::{Aabb, Camera, Light, Plan};
 use umbrage_lab::{Fit, NamedTechnique};
-use umbrage_render::FrameTarget;
-use umbrage_scene::{SceneCamera, Scene};
+use umbrage_measure::{ErrorScale, FALSE_LIGHT, PARTITIONS, Rgb};
+use umbrage_render::{FrameTarget, SCALE_COLORS};
+use umbrage_scene::{Scene, SceneCamera};
 
 /// A frame that the window wants. Requests that are equal give equal frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +52,28 @@ pub(crate) enum Overlay {
     Maps,
 }
 
+impl Overlay {
+    /// The overlay with the colours that reports use.
+    pub(super) fn colors(self) -> umbrage_render::Overlay<'static> {
+        static ERRORS: LazyLock<[Rgb; SCALE_COLORS]> = LazyLock::new(|| {
+            let scale = ErrorScale::default();
+            let last = (SCALE_COLORS - 1) as f32;
+            std::array::from_fn(|i| {
+                let error = scale.max().powf(2.0 * i as f32 / last - 1.0);
+                scale.color(error).unwrap_or_default()
+            })
+        });
+        match self {
+            Self::Error => {
+                let max = ErrorScale::default().max();
+                umbrage_render::Overlay::Error { colors: &ERRORS, max }
+            }
+            Self::Grid => umbrage_render::Overlay::Grid { color: FALSE_LIGHT },
+            Self::Maps => umbrage_render::Overlay::Partition { colors: &PARTITIONS },
+        }
+    }
+}
+
 /// What was drawn for a request.
 pub(crate) struct Frame {
     pub(crate) request: Request,
@@ -64,7 +87,7 @@ pub(crate) struct Frame {
     pub(crate) map: Option<Arc<FrameTarget>>,
     /// The edges of body B: what the planned view sees of the receivers, world space, metres. Empty
     /// unless the plan was made for another camera.
-    pub(crate) body: Arc<Vec<[DVec3; 2]>>,
+    pub(crate) body: Vec<[DVec3; 2]>,
 }
 
 /// A technique's picture.
@@ -137,7 +160,9 @@ impl SceneInfo {
     }
 
     /// The words and values of a scene's cameras and lights.
-    pub(crate) fn cameras_and_lights(scene: &Scene) -> (Vec<(String, SceneCamera)>, Vec<(String, Light)>) {
+    pub(crate) fn cameras_and_lights(
+        scene: &Scene,
+    ) -> (Vec<(String, SceneCamera)>, Vec<(String, Light)>) {
         let cameras = Self::words(&scene.camera_choices());
         let lights = Self::words(&scene.light_choices());
         (

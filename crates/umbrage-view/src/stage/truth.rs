@@ -145,7 +145,8 @@ pub(super) fn trace(
                 return Ok(());
             }
             let trace_row = |&y: &u32| {
-                let row = level(width, y, step).map(|x| (x, Pixel::trace(&view, area.as_ref(), x, y)));
+                let row =
+                    level(width, y, step).map(|x| (x, Pixel::trace(&view, area.as_ref(), x, y)));
                 (y, row.collect::<Vec<_>>())
             };
             let traced: Vec<_> = rows.par_iter().map(trace_row).collect();
