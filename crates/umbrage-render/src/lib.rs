@@ -26,7 +26,7 @@ pub use overlay::{Overlay, PARTITION_COLORS, SCALE_COLORS};
 pub use renderer::{Drawn, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
-pub use timer::Timer;
+pub use timer::{Stage, StageTimes, Timer};
 
 /// The README's examples are tests. They are here, because this crate stays in the repository: the
 /// crates that they are about are also published, where there is no such file.

@@ -3,7 +3,7 @@ use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::overlay::OverlayUniform;
 use crate::points::Points;
 use crate::scene::SceneBuffers;
-use crate::timer::Timer;
+use crate::timer::{Stage, Timer};
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
@@ -12,7 +12,7 @@ use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
     CasterInstance, Casters, DEPTH_FORMAT, DepthProjection, Frame, Mask, MeshCasters, MeshKind,
-    SeenReadback, ShadowOptions, Shadows, Support,
+    SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
@@ -20,11 +20,13 @@ use wgpu::{
     Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
     IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
-    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
-    VertexState, VertexStepMode,
+    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites,
+    RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages, StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout,
+    VertexFormat, VertexState, VertexStepMode,
 };
+
+use wgpu_profiler::GpuProfilerQuery;
 
 /// Draws one scene with one kind of shadow maps.
 pub struct Renderer<'g, 's> {
@@ -208,7 +210,7 @@ impl<'g, 's> Renderer<'g, 's> {
         &mut self,
         plan: &Plan,
         casters: Casters<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
         self.draw_maps_seen_from(plan.origin, plan, casters, timer)
     }
@@ -225,9 +227,10 @@ impl<'g, 's> Renderer<'g, 's> {
         eye: DVec3,
         plan: &Plan,
         casters: Casters<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
         let Self { gpu, scene, shadows, instances, opaque, masked, masks, edge_on, .. } = self;
+        let is_prefiltered = shadows.options().filter.prefilter().is_some();
         let frame = Frame { plan, render_origin: eye, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = Some(eye);
@@ -246,7 +249,10 @@ impl<'g, 's> Renderer<'g, 's> {
         }
         instances.upload(gpu)?;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
+        let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
+        let depth = begin(Stage::Depth);
+        let filter = if is_prefiltered { begin(Stage::Filter) } else { None };
+        let timestamps = Timestamps { depth: writes(&depth), filter: writes(&filter) };
         let mut lists = lists.into_iter();
         prepared.encode(&mut encoder, &timestamps, |map| {
             let index = map.redraw.index;
@@ -264,7 +270,7 @@ impl<'g, 's> Renderer<'g, 's> {
             }
         });
         if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
+            timer.end(&mut encoder, depth.into_iter().chain(filter));
         }
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
@@ -280,7 +286,7 @@ impl<'g, 's> Renderer<'g, 's> {
         &mut self,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         self.draw_frame("frame", shading, target, timer)
     }
@@ -291,7 +297,7 @@ impl<'g, 's> Renderer<'g, 's> {
         name: &'static str,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let tile = Tile::whole(shading.camera);
         let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
@@ -301,9 +307,6 @@ impl<'g, 's> Renderer<'g, 's> {
         let parts = Target { color, depth, depth_store, pipelines: &pipelines };
         let drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
         target.encode_copy(&mut encoder);
-        if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
-        }
         self.gpu.queue().submit([encoder.finish()]);
         self.gpu.check()?;
         Ok(drawn)
@@ -350,7 +353,7 @@ impl<'g, 's> Renderer<'g, 's> {
         shading: &Shading<'_>,
         tile: &Tile,
         target: &Target<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let Self { gpu, scene, instances, .. } = self;
         let Shading { camera, light, light_index } = *shading;
@@ -369,6 +372,7 @@ impl<'g, 's> Renderer<'g, 's> {
         });
         instances.upload(gpu)?;
         let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
+        let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &attachments,
@@ -377,7 +381,7 @@ impl<'g, 's> Renderer<'g, 's> {
                 depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: target.depth_store }),
                 stencil_ops: None,
             }),
-            timestamp_writes: timer.map(Timer::shade_pass),
+            timestamp_writes: writes(&query),
             occlusion_query_set: None,
             multiview_mask: None,
         });
@@ -398,6 +402,9 @@ impl<'g, 's> Renderer<'g, 's> {
             pass.draw(0..3, 0..1);
         }
         drop(pass);
+        if let Some(timer) = timer {
+            timer.end(encoder, query);
+        }
         Ok(drawn)
     }
 }
@@ -573,6 +580,10 @@ fn pipelines(
         masked: pipeline("mesh_vertex", "masked", &buffers, CompareFunction::Greater),
         sky: pipeline("sky_vertex", "sky", &[], CompareFunction::GreaterEqual),
     }
+}
+
+fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {
+    query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes)
 }
 
 fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {

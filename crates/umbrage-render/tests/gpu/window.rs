@@ -2,7 +2,7 @@
 
 use crate::{GPU, Set, scene};
 use umbrage::Technique;
-use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, ShadowOptions};
 use wgpu::{BufferUsages, Instance, InstanceDescriptor, MapMode, PollType};
@@ -43,6 +43,43 @@ fn a_window_shows_the_bytes_of_the_frame() {
     assert_eq!(read.len(), 75 * 40);
     assert!(read.iter().all(|c| c[3] == 255), "opaque");
     assert_eq!(loaded(&target), read);
+}
+
+/// A window reads times without waiting, whenever a frame is done.
+#[needs(gpu)]
+#[test]
+fn times_come_when_frames_are_done() {
+    let scene = scene("pole");
+    let set = Set::new(&scene, [75, 40]);
+    let light = set.light();
+    let technique: Technique = "uniform:vsm@64".parse().unwrap();
+    let plan = set.plan(&[light], &technique);
+    let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &options).unwrap();
+    let target = FrameTarget::new(&GPU, [75, 40]).unwrap();
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    let mut timer = Timer::new(&GPU).expect("timestamps");
+    assert_eq!(timer.try_read(&GPU).unwrap(), None, "no frame");
+    // More frames than wait for their times.
+    let mut done = 0;
+    for _ in 0..10 {
+        renderer.draw_maps(&plan, Casters::Moved, Some(&mut timer)).unwrap();
+        renderer.frame(&shading, &target, Some(&mut timer)).unwrap();
+        done += usize::from(timer.try_read(&GPU).unwrap().is_some());
+    }
+    GPU.wait().unwrap();
+    let last = timer.try_read(&GPU).unwrap();
+    assert!(done > 0 || last.is_some(), "some frame is done");
+    renderer.draw_maps(&plan, Casters::Moved, Some(&mut timer)).unwrap();
+    let maps = timer.read(&GPU).unwrap();
+    assert!(maps.depth_ms > 0.0 && maps.filter_ms > 0.0, "{maps:?}");
+    assert_eq!(maps.picture_ms, 0.0, "none was drawn since");
+    renderer.draw_maps(&plan, Casters::Unmoved, Some(&mut timer)).unwrap();
+    renderer.frame(&shading, &target, Some(&mut timer)).unwrap();
+    let still = timer.read(&GPU).unwrap();
+    assert_eq!([still.depth_ms, still.filter_ms], [0.0; 2], "the maps are as they were");
+    assert!(still.picture_ms > 0.0);
 }
 
 /// The texels of the view for windows, as a shader loads them.
