@@ -1,5 +1,6 @@
 use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
+use crate::map_picture::MapPicture;
 use crate::overlay::OverlayUniform;
 use crate::points::Points;
 use crate::scene::SceneBuffers;
@@ -34,6 +35,7 @@ pub struct Renderer<'g, 's> {
     scene: &'g SceneBuffers<'s>,
     pub(crate) shadows: Shadows,
     pub(crate) points: Option<Points>,
+    pub(crate) map_picture: Option<MapPicture>,
     opaque: MeshCasters,
     masked: MeshCasters,
     /// One for each material; `None` for opaque materials.
@@ -175,6 +177,7 @@ impl<'g, 's> Renderer<'g, 's> {
             scene,
             shadows,
             points: None,
+            map_picture: None,
             opaque,
             masked,
             masks,
@@ -409,7 +412,7 @@ impl<'g, 's> Renderer<'g, 's> {
     }
 }
 
-fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
+pub(crate) fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
     device.create_buffer(&BufferDescriptor {
         label: Some(label),
         size: size_of::<T>() as u64,
@@ -586,7 +589,7 @@ fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<
     query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes)
 }
 
-fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+pub(crate) fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
     Some(RenderPassColorAttachment {
         view,
         depth_slice: None,
