@@ -7,7 +7,7 @@ use crate::receivers::Receivers;
 use crate::strip::Rows;
 use std::time::Instant;
 use umbrage::{Plan, Technique};
-use umbrage_render::{Drawn, FrameTarget, Shading, Timer};
+use umbrage_render::{Drawn, FrameTarget, Shading, StageTimes, Timer};
 use umbrage_trace::{Reference, Tracer, View};
 use umbrage_wgpu::{Casters, SeenReadback};
 
@@ -85,10 +85,10 @@ impl<'a> Bencher<'a> {
     /// # Errors
     /// An error if a GPU fails, or if the maps do not fit into memory.
     pub fn frame(&mut self, view: &View<'_>, plan: &Plan, still: bool) -> Result<Costs, Error> {
-        match (&mut self.executor.work, &self.target) {
+        match (&mut self.executor.work, &mut self.target) {
             (Work::Gpu(on), Some((target, timer))) => {
                 let casters = if still { Casters::Unmoved } else { Casters::Moved };
-                let costs = frame_on_gpu(on, target, timer.as_ref(), view, plan, casters)?;
+                let costs = frame_on_gpu(on, target, timer.as_mut(), view, plan, casters)?;
                 let Some(readback) = &mut self.readback else { return Ok(costs) };
                 let start = Instant::now();
                 on.renderer.seen(view.camera(), target, readback)?;
@@ -103,7 +103,7 @@ impl<'a> Bencher<'a> {
 fn frame_on_gpu(
     on: &mut OnGpu<'_>,
     target: &FrameTarget,
-    timer: Option<&Timer>,
+    mut timer: Option<&mut Timer>,
     view: &View<'_>,
     plan: &Plan,
     casters: Casters,
@@ -111,9 +111,9 @@ fn frame_on_gpu(
     let OnGpu { renderer, gpu, .. } = on;
     let start = Instant::now();
     let shading = Shading { camera: view.camera(), light: view.light(), light_index: 0 };
-    let drawn = renderer.draw_maps(plan, casters, timer)?;
+    let drawn = renderer.draw_maps(plan, casters, timer.as_deref_mut())?;
     let for_maps = milliseconds(start);
-    let ([depth, filter, shade], for_picture) = match timer {
+    let (times, for_picture) = match &mut timer {
         Some(timer) => {
             let start = Instant::now();
             renderer.frame(&shading, target, Some(timer))?;
@@ -122,18 +122,20 @@ fn frame_on_gpu(
         }
         None => {
             gpu.wait()?;
-            let depth = milliseconds(start);
+            let depth_ms = milliseconds(start);
             let shaded = Instant::now();
             renderer.frame(&shading, target, None)?;
             let for_picture = milliseconds(shaded);
             gpu.wait()?;
-            ([depth, 0.0, milliseconds(shaded)], for_picture)
+            let picture_ms = milliseconds(shaded);
+            (StageTimes { depth_ms, picture_ms, ..StageTimes::default() }, for_picture)
         }
     };
     let cpu = Some(for_maps + for_picture);
-    let [depth, filter] = if drawn.is_empty() { [0.0; 2] } else { [depth, filter] };
+    let StageTimes { depth_ms, filter_ms, picture_ms: shade } = times;
+    let depth = if drawn.is_empty() { 0.0 } else { depth_ms };
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
-    let filter = Some(filter).filter(|_| is_prefiltered && timer.is_some());
+    let filter = Some(filter_ms).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
     Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn) })
 }

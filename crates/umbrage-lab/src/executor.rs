@@ -201,10 +201,10 @@ impl<'a> Executor<'a> {
             Work::Gpu(on) => {
                 let OnGpu { renderer, gpu, tracer, timer, has_maps } = &mut **on;
                 renderer.leave_out(edge_on(new, tracer));
-                renderer.draw_maps(new, Casters::Unmoved, timer.as_ref()).on_gpu()?;
+                renderer.draw_maps(new, Casters::Unmoved, timer.as_mut()).on_gpu()?;
                 gpu.wait()?;
                 *has_maps = true;
-                Ok(timer.as_ref().map(|t| t.read(gpu)).transpose()?.map(|[_, filter, _]| filter))
+                Ok(timer.as_mut().map(|t| t.read(gpu)).transpose()?.map(|times| times.filter_ms))
             }
             Work::Reference { tracer, maps } => {
                 *maps = Some((new, Reference::render(tracer, new, progress)?));

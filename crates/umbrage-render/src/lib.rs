@@ -3,13 +3,16 @@
 //!
 //! - [`Gpu`] is a device, opened here or by a window; [`devices`] reports on all adapters.
 //! - [`SceneBuffers`] hold the meshes and materials of a scene on the device.
-//! - [`Renderer`] draws the maps of a plan, and then [frames](Renderer::frame) to display or
-//!   [samples](Renderer::samples) to measure.
+//! - [`Renderer`] draws the maps of a plan, and then [frames](Renderer::frame) to display, with
+//!   or without [overlays](Overlay), or [samples](Renderer::samples) to measure.
+//! - [`FrameTarget`] is what frames, and [pictures of the maps](Renderer::show_map), are drawn into.
+//! - [`Timer`] measures what the stages of frames take.
 
 mod error;
 mod frame_target;
 mod gpu;
 mod instances;
+mod map_picture;
 mod overlay;
 mod points;
 mod renderer;
@@ -26,7 +29,7 @@ pub use overlay::{Overlay, PARTITION_COLORS, SCALE_COLORS};
 pub use renderer::{Drawn, Renderer, Shading};
 pub use samples::Sample;
 pub use scene::SceneBuffers;
-pub use timer::Timer;
+pub use timer::{Stage, StageTimes, Timer};
 
 /// The README's examples are tests. They are here, because this crate stays in the repository: the
 /// crates that they are about are also published, where there is no such file.

@@ -81,7 +81,7 @@ impl Renderer<'_, '_> {
         overlay: &Overlay<'_>,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let uniform = OverlayUniform::new(overlay, shading.camera.far())?;
         self.gpu.queue().write_buffer(&self.overlay_buffer, 0, bytemuck::bytes_of(&uniform));

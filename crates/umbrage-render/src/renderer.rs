@@ -1,9 +1,10 @@
 use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
+use crate::map_picture::MapPicture;
 use crate::overlay::OverlayUniform;
 use crate::points::Points;
 use crate::scene::SceneBuffers;
-use crate::timer::Timer;
+use crate::timer::{Stage, Timer};
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
 use glam::{DVec3, Vec3};
@@ -12,7 +13,7 @@ use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
     CasterInstance, Casters, DEPTH_FORMAT, DepthProjection, Frame, Mask, MeshCasters, MeshKind,
-    SeenReadback, ShadowOptions, Shadows, Support,
+    SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
@@ -20,11 +21,13 @@ use wgpu::{
     Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
     IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
     PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
-    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat,
-    VertexState, VertexStepMode,
+    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites,
+    RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages, StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout,
+    VertexFormat, VertexState, VertexStepMode,
 };
+
+use wgpu_profiler::GpuProfilerQuery;
 
 /// Draws one scene with one kind of shadow maps.
 pub struct Renderer<'g, 's> {
@@ -32,6 +35,7 @@ pub struct Renderer<'g, 's> {
     scene: &'g SceneBuffers<'s>,
     pub(crate) shadows: Shadows,
     pub(crate) points: Option<Points>,
+    pub(crate) map_picture: Option<MapPicture>,
     opaque: MeshCasters,
     masked: MeshCasters,
     /// One for each material; `None` for opaque materials.
@@ -173,6 +177,7 @@ impl<'g, 's> Renderer<'g, 's> {
             scene,
             shadows,
             points: None,
+            map_picture: None,
             opaque,
             masked,
             masks,
@@ -208,7 +213,7 @@ impl<'g, 's> Renderer<'g, 's> {
         &mut self,
         plan: &Plan,
         casters: Casters<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
         self.draw_maps_seen_from(plan.origin, plan, casters, timer)
     }
@@ -225,9 +230,10 @@ impl<'g, 's> Renderer<'g, 's> {
         eye: DVec3,
         plan: &Plan,
         casters: Casters<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
         let Self { gpu, scene, shadows, instances, opaque, masked, masks, edge_on, .. } = self;
+        let is_prefiltered = shadows.options().filter.prefilter().is_some();
         let frame = Frame { plan, render_origin: eye, casters };
         let prepared = shadows.prepare(gpu.device(), gpu.queue(), &frame)?;
         self.eye = Some(eye);
@@ -246,7 +252,10 @@ impl<'g, 's> Renderer<'g, 's> {
         }
         instances.upload(gpu)?;
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let timestamps = timer.map(Timer::map_passes).unwrap_or_default();
+        let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
+        let depth = begin(Stage::Depth);
+        let filter = if is_prefiltered { begin(Stage::Filter) } else { None };
+        let timestamps = Timestamps { depth: writes(&depth), filter: writes(&filter) };
         let mut lists = lists.into_iter();
         prepared.encode(&mut encoder, &timestamps, |map| {
             let index = map.redraw.index;
@@ -264,7 +273,7 @@ impl<'g, 's> Renderer<'g, 's> {
             }
         });
         if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
+            timer.end(&mut encoder, depth.into_iter().chain(filter));
         }
         gpu.queue().submit([encoder.finish()]);
         gpu.check()?;
@@ -280,7 +289,7 @@ impl<'g, 's> Renderer<'g, 's> {
         &mut self,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         self.draw_frame("frame", shading, target, timer)
     }
@@ -291,7 +300,7 @@ impl<'g, 's> Renderer<'g, 's> {
         name: &'static str,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let tile = Tile::whole(shading.camera);
         let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
@@ -301,9 +310,6 @@ impl<'g, 's> Renderer<'g, 's> {
         let parts = Target { color, depth, depth_store, pipelines: &pipelines };
         let drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
         target.encode_copy(&mut encoder);
-        if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
-        }
         self.gpu.queue().submit([encoder.finish()]);
         self.gpu.check()?;
         Ok(drawn)
@@ -350,7 +356,7 @@ impl<'g, 's> Renderer<'g, 's> {
         shading: &Shading<'_>,
         tile: &Tile,
         target: &Target<'_>,
-        timer: Option<&Timer>,
+        timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let Self { gpu, scene, instances, .. } = self;
         let Shading { camera, light, light_index } = *shading;
@@ -369,6 +375,7 @@ impl<'g, 's> Renderer<'g, 's> {
         });
         instances.upload(gpu)?;
         let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
+        let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &attachments,
@@ -377,7 +384,7 @@ impl<'g, 's> Renderer<'g, 's> {
                 depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: target.depth_store }),
                 stencil_ops: None,
             }),
-            timestamp_writes: timer.map(Timer::shade_pass),
+            timestamp_writes: writes(&query),
             occlusion_query_set: None,
             multiview_mask: None,
         });
@@ -398,11 +405,14 @@ impl<'g, 's> Renderer<'g, 's> {
             pass.draw(0..3, 0..1);
         }
         drop(pass);
+        if let Some(timer) = timer {
+            timer.end(encoder, query);
+        }
         Ok(drawn)
     }
 }
 
-fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
+pub(crate) fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
     device.create_buffer(&BufferDescriptor {
         label: Some(label),
         size: size_of::<T>() as u64,
@@ -575,7 +585,11 @@ fn pipelines(
     }
 }
 
-fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {
+    query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes)
+}
+
+pub(crate) fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
     Some(RenderPassColorAttachment {
         view,
         depth_slice: None,

@@ -1,21 +1,51 @@
 //! Measures the time of the stages on the GPU, by timestamp queries.
 
 use crate::{Error, Gpu};
-use umbrage_wgpu::Timestamps;
-use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Features, QuerySet, QuerySetDescriptor,
-    QueryType, RenderPassTimestampWrites,
-};
+use wgpu::{CommandEncoder, Features, PollType};
+use wgpu_profiler::{GpuProfiler, GpuProfilerQuery, GpuProfilerSettings};
 
-/// Measures one frame at a time.
+/// Measures the time that the stages of frames take on the GPU. A frame is all that is timed between
+/// two calls of [`read`](Self::read) or [`try_read`](Self::try_read).
 pub struct Timer {
-    queries: QuerySet,
-    resolved: Buffer,
-    readback: Buffer,
+    profiler: GpuProfiler,
+    /// Whether anything was timed in this frame.
+    is_timed: bool,
 }
 
-const COUNT: u32 = 6;
-const BYTES: u64 = 8 * COUNT as u64;
+/// A stage of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The passes that draw casters into maps.
+    Depth,
+    /// The passes of the prefilter.
+    Filter,
+    /// The pass that draws the picture.
+    Picture,
+}
+
+impl Stage {
+    fn label(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Filter => "filter",
+            Self::Picture => "picture",
+        }
+    }
+}
+
+/// The times that the stages of a frame took on the GPU, milliseconds; 0 for stages without passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageTimes {
+    /// Time to draw casters into maps.
+    pub depth_ms: f64,
+    /// Time to prefilter the maps.
+    pub filter_ms: f64,
+    /// Time to draw the picture.
+    pub picture_ms: f64,
+}
+
+/// The most frames that may wait for their times. Later ones are dropped until then.
+const MOST_IN_FLIGHT: usize = 4;
 
 impl Timer {
     /// Makes a timer; `None` if the device has no timestamps.
@@ -23,58 +53,80 @@ impl Timer {
         if !gpu.device().features().contains(Features::TIMESTAMP_QUERY) {
             return None;
         }
-        let buffer = |usage| {
-            gpu.device().create_buffer(&BufferDescriptor {
-                label: Some("timestamps"),
-                size: BYTES,
-                usage,
-                mapped_at_creation: false,
-            })
+        let settings = GpuProfilerSettings {
+            max_num_pending_frames: MOST_IN_FLIGHT,
+            ..GpuProfilerSettings::default()
         };
-        Some(Self {
-            queries: gpu.device().create_query_set(&QuerySetDescriptor {
-                label: Some("timestamps"),
-                ty: QueryType::Timestamp,
-                count: COUNT,
-            }),
-            resolved: buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
-            readback: buffer(BufferUsages::COPY_DST | BufferUsages::MAP_READ),
-        })
+        let profiler = GpuProfiler::new(gpu.device(), settings).ok()?;
+        Some(Self { profiler, is_timed: false })
     }
 
-    fn writes(&self, first: u32) -> RenderPassTimestampWrites<'_> {
-        RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(first),
-            end_of_pass_write_index: Some(first + 1),
+    /// Begins to time passes of a stage. The query has the timestamps for the passes: the first
+    /// must write the beginning and the last the end. Give the query back to [`end`](Self::end).
+    pub fn begin(&self, stage: Stage, encoder: &mut CommandEncoder) -> GpuProfilerQuery {
+        self.profiler.begin_pass_query(stage.label(), encoder)
+    }
+
+    /// Ends queries whose passes are encoded. The encoder must be submitted before the frame is
+    /// read.
+    pub fn end(
+        &mut self,
+        encoder: &mut CommandEncoder,
+        queries: impl IntoIterator<Item = GpuProfilerQuery>,
+    ) {
+        for query in queries {
+            self.profiler.end_query(encoder, query);
+            self.is_timed = true;
         }
+        self.profiler.resolve_queries(encoder);
     }
 
-    pub(crate) fn map_passes(&self) -> Timestamps<'_> {
-        Timestamps { depth: Some(self.writes(0)), filter: Some(self.writes(4)) }
-    }
-
-    /// The timestamps of the pass that draws a picture.
-    pub fn shade_pass(&self) -> RenderPassTimestampWrites<'_> {
-        self.writes(2)
-    }
-
-    /// Makes the timestamps readable, after the passes that they are about.
-    pub fn resolve(&self, encoder: &mut CommandEncoder) {
-        encoder.resolve_query_set(&self.queries, 0..COUNT, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, BYTES);
-    }
-
-    /// Waits for the last frame and returns the times that its depth passes, filter passes and
-    /// picture took on the GPU, milliseconds. If a frame has no passes of a kind, their time is
-    /// that of the last frame that had some.
+    /// Waits for the frame and returns its times, which are 0 if nothing was timed.
     ///
     /// # Errors
-    /// The device was lost.
-    pub fn read(&self, gpu: &Gpu) -> Result<[f64; 3], Error> {
-        let ticks: Vec<u64> = gpu.read(&self.readback)?;
-        let ms = f64::from(gpu.queue().get_timestamp_period()) * 1e-6;
-        let span = |i: usize| ticks[i + 1].saturating_sub(ticks[i]) as f64 * ms;
-        Ok([span(0), span(4), span(2)])
+    /// The device was lost, or refused something.
+    pub fn read(&mut self, gpu: &Gpu) -> Result<StageTimes, Error> {
+        let is_timed = self.end_frame()?;
+        gpu.wait()?;
+        Ok(self.newest(gpu).filter(|_| is_timed).unwrap_or_default())
+    }
+
+    /// Ends the frame without waiting for it, and returns the times of the newest frame that is
+    /// done; `None` if none has been done since the last call.
+    ///
+    /// # Errors
+    /// The device was lost, or refused something.
+    pub fn try_read(&mut self, gpu: &Gpu) -> Result<Option<StageTimes>, Error> {
+        self.end_frame()?;
+        let polled = gpu.device().poll(PollType::Poll);
+        gpu.check()?;
+        polled.map_err(|e| Error::Lost(e.to_string()))?;
+        Ok(self.newest(gpu))
+    }
+
+    /// Ends the frame if anything was timed in it, and returns whether it was.
+    fn end_frame(&mut self) -> Result<bool, Error> {
+        let is_timed = std::mem::take(&mut self.is_timed);
+        if is_timed {
+            self.profiler.end_frame().map_err(|e| Error::Refused(e.to_string()))?;
+        }
+        Ok(is_timed)
+    }
+
+    /// The times of the newest frame that is done; older ones are dropped.
+    fn newest(&mut self, gpu: &Gpu) -> Option<StageTimes> {
+        let period = gpu.queue().get_timestamp_period();
+        let done = std::iter::from_fn(|| self.profiler.process_finished_frame(period));
+        let newest = done.last()?;
+        let ms = |stage: Stage| {
+            let passes = newest.iter().filter(|r| r.label == stage.label());
+            let spans = passes.filter_map(|r| r.time.as_ref());
+            spans.fold(0.0, |ms, t| ms + 1e3 * (t.end - t.start).max(0.0))
+        };
+        Some(StageTimes {
+            depth_ms: ms(Stage::Depth),
+            filter_ms: ms(Stage::Filter),
+            picture_ms: ms(Stage::Picture),
+        })
     }
 }

@@ -4,9 +4,10 @@ use bytemuck::{bytes_of, cast_slice};
 use glam::{DMat4, Mat4, Vec3, Vec4};
 use std::ops::Range;
 use umbrage::Plan;
-use umbrage_render::{Gpu, Timer};
+use umbrage_render::{Gpu, Stage, Timer};
 use umbrage_scene::Scene;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu_profiler::GpuProfilerQuery;
 
 const SHADER: &str = "
     @group(0) @binding(0) var<uniform> clip_from_local: mat4x4f;
@@ -114,7 +115,7 @@ impl<'a> BareDepth<'a> {
     }
 
     /// Draws and submits the same triangles as the library, culled in the same way.
-    pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan, timer: Option<&Timer>) {
+    pub(crate) fn draw(&mut self, gpu: &Gpu, plan: &Plan, timer: Option<&mut Timer>) {
         let ndc = DMat4::from_cols_array_2d(&[
             [2.0, 0.0, 0.0, 0.0],
             [0.0, -2.0, 0.0, 0.0],
@@ -142,9 +143,11 @@ impl<'a> BareDepth<'a> {
         }
         gpu.queue().write_buffer(&self.instances, 0, cast_slice(&rows));
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
+        // The time of all passes is that of one picture.
+        let query = timer.as_ref().map(|t| t.begin(Stage::Picture, &mut encoder));
         for (i, (bare, draws)) in self.maps.iter().zip(draws).enumerate() {
-            // The time of all passes is that of one picture.
-            let timestamp_writes = timer.map(Timer::shade_pass).map(|all| {
+            let all = query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes);
+            let timestamp_writes = all.map(|all| {
                 let begins = all.beginning_of_pass_write_index.filter(|_| i == 0);
                 let ends = all.end_of_pass_write_index.filter(|_| i + 1 == self.maps.len());
                 wgpu::RenderPassTimestampWrites {
@@ -179,7 +182,7 @@ impl<'a> BareDepth<'a> {
             }
         }
         if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
+            timer.end(&mut encoder, query);
         }
         gpu.queue().submit([encoder.finish()]);
     }

@@ -22,12 +22,13 @@ use bare::BareDepth;
 use cases::Case;
 use clap::Parser;
 use lookup::bare_renderer;
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::time::Instant;
 use table::{Jobs, Table};
 use umbrage::visibility::Filter;
 use umbrage::{Bounds, Camera, Plan, Planner, Size, Technique};
-use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
+use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
 use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -114,7 +115,7 @@ struct Set<'a> {
     boxes: umbrage::BoxTree,
     target: FrameTarget,
     /// `None` if the GPU has no timestamps. Times are then taken from the wall clock.
-    timer: Option<Timer>,
+    timer: RefCell<Option<Timer>>,
 }
 
 /// The times of one frame, milliseconds. Those of stages that a job does not have are 0.
@@ -136,7 +137,7 @@ impl<'a> Set<'a> {
             all: case.scene.bounds(),
             boxes: umbrage::BoxTree::new(&Tracer::new(&case.scene)?.boxes(256))?,
             target: FrameTarget::new(gpu, image)?,
-            timer: Timer::new(gpu),
+            timer: RefCell::new(Timer::new(gpu)),
         })
     }
 
@@ -162,12 +163,12 @@ impl<'a> Set<'a> {
 
     /// The times that the GPU took for depth passes, filter passes and the picture since `start`.
     /// Without timestamps, all of it counts as the time of the picture.
-    fn read(&self, start: Instant) -> Result<[f64; 3], Failure> {
-        match &self.timer {
+    fn read(&self, start: Instant) -> Result<StageTimes, Failure> {
+        match &mut *self.timer.borrow_mut() {
             Some(timer) => Ok(timer.read(self.gpu)?),
             None => {
                 self.gpu.wait()?;
-                Ok([0.0, 0.0, milliseconds(start)])
+                Ok(StageTimes { picture_ms: milliseconds(start), ..StageTimes::default() })
             }
         }
     }
@@ -183,13 +184,13 @@ impl<'a> Set<'a> {
         let plan = self.planned(planner, technique)?;
         let planned = milliseconds(start);
         let start = Instant::now();
-        let drawn = renderer.draw_maps(plan, Casters::Moved, self.timer.as_ref())?;
+        let drawn = renderer.draw_maps(plan, Casters::Moved, self.timer.borrow_mut().as_mut())?;
         let mut times = Times { plan: planned, ..Times::default() };
         if !drawn.is_empty() {
-            let [depth, filter, wall] = self.read(start)?;
-            let is_prefiltered = technique.filter.prefilter().is_some();
-            times.depth = if self.timer.is_some() { depth } else { wall };
-            times.filter = if is_prefiltered { filter } else { 0.0 };
+            let StageTimes { depth_ms, filter_ms, picture_ms: wall_ms } = self.read(start)?;
+            // Only without timestamps is there time of a picture.
+            times.depth = depth_ms + wall_ms;
+            times.filter = filter_ms;
         }
         times.shade = self.picture(renderer)?;
         Ok(times)
@@ -199,15 +200,15 @@ impl<'a> Set<'a> {
     fn picture(&self, renderer: &mut Renderer<'_, '_>) -> Result<f64, Failure> {
         let shading = Shading { camera: &self.camera, light: &self.case.light, light_index: 0 };
         let start = Instant::now();
-        renderer.frame(&shading, &self.target, self.timer.as_ref())?;
-        Ok(self.read(start)?[2])
+        renderer.frame(&shading, &self.target, self.timer.borrow_mut().as_mut())?;
+        Ok(self.read(start)?.picture_ms)
     }
 
     /// Draws the maps without a library, and returns the time that it takes.
     fn bare_depth(&self, bare: &mut BareDepth<'_>, plan: &Plan) -> Result<f64, Failure> {
         let start = Instant::now();
-        bare.draw(self.gpu, plan, self.timer.as_ref());
-        Ok(self.read(start)?[2])
+        bare.draw(self.gpu, plan, self.timer.borrow_mut().as_mut());
+        Ok(self.read(start)?.picture_ms)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{GPU, Set, scene};
 use umbrage::{Size, Technique, Warp};
-use umbrage_render::{Error, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, devices};
+use umbrage_render::{Error, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer, devices};
 use umbrage_testing::needs;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
@@ -26,12 +26,18 @@ fn a_lost_device_is_reported() {
     let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let buffers = SceneBuffers::new(&gpu, &scene, false).unwrap();
     let mut renderer = Renderer::new(&gpu, &buffers, &ShadowOptions::default()).unwrap();
-    renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+    let mut timer = Timer::new(&gpu).expect("timestamps");
+    let target = FrameTarget::new(&gpu, [32, 18]).unwrap();
+    renderer.draw_maps(&plan, Casters::Unmoved, Some(&mut timer)).unwrap();
     gpu.device().destroy();
     let lost = |e: Error| assert!(matches!(e, Error::Lost(_)), "{e}");
     lost(renderer.samples(&shading, 0..18, 1, true).unwrap_err());
     lost(renderer.visibility(0, &[[set.camera.eye(); 2]]).unwrap_err());
-    renderer.draw_maps(&plan, Casters::Moved, None).map_or_else(lost, drop);
+    renderer.draw_maps(&plan, Casters::Moved, Some(&mut timer)).map_or_else(lost, drop);
+    renderer.frame(&shading, &target, Some(&mut timer)).map_or_else(lost, drop);
+    lost(timer.try_read(&gpu).unwrap_err());
+    lost(timer.read(&gpu).unwrap_err());
+    lost(target.read(&gpu).unwrap_err());
 }
 
 #[needs(gpu)]
