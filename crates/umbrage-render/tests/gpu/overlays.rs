@@ -1,7 +1,8 @@
 //! Overlays are the pictures of reports, drawn by a GPU.
 
 use crate::{GPU, Set, scene};
-use umbrage::{Partition, Size, Technique};
+use glam::DVec3;
+use umbrage::{Camera, LookAt, Partition, Size, Technique};
 use umbrage_measure::{ErrorScale, FALSE_LIGHT, Image, PARTITIONS, Rgb};
 use umbrage_measure::{error_map, partition_map, texel_map};
 use umbrage_render::{Error, FrameTarget, Overlay, Renderer, SCALE_COLORS, SceneBuffers, Shading};
@@ -73,6 +74,46 @@ fn overlays_are_the_pictures_of_reports() {
     assert!(share < 0.1, "{share} of the lines differ");
 }
 
+/// What a turned camera sees lies beside the maps, although it may be no farther away than the slice
+/// ends.
+#[needs(gpu)]
+#[test]
+fn what_no_map_holds_is_hatched() {
+    let scene = scene("pole");
+    let set = Set::new(&scene, SIZE);
+    let light = set.light();
+    let buffers = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let target = FrameTarget::new(&GPU, SIZE).unwrap();
+    let plan = set.plan(&[light], &Technique::default());
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    let colors = scale_colors(ErrorScale::default());
+    let forward = set.camera.forward() * DVec3::new(1.0, 0.0, 1.0) + DVec3::NEG_Y;
+    let [ahead, behind] = [1.0, -1.0].map(|side| {
+        let eye = set.camera.eye() + DVec3::Y;
+        let camera = Camera::look_at(LookAt {
+            eye,
+            target: eye + forward * DVec3::new(side, 1.0, side),
+            up: DVec3::Y,
+            fov_y_rad: 0.5,
+            near: set.camera.near(),
+            far: set.camera.far(),
+            image: SIZE,
+        })
+        .unwrap();
+        let shading = Shading { camera: &camera, light: &light, light_index: 0 };
+        renderer.draw_maps_seen_from(eye, &plan, Casters::Unmoved, None).unwrap();
+        let overlay = Overlay::Error { colors: &colors, max: 32.0 };
+        renderer.frame_with(&overlay, &shading, &target, None).unwrap();
+        let pixels = target.read(&GPU).unwrap();
+        pixels.iter().filter(|c| is_hatch(c)).count() as f64 / pixels.len() as f64
+    });
+    assert!(ahead < 0.5 && behind > 0.9, "{ahead} ahead and {behind} behind are hatched");
+}
+
+fn is_hatch(c: &[u8; 4]) -> bool {
+    *c == [90, 90, 90, 255] || *c == [160, 160, 160, 255]
+}
+
 #[needs(gpu)]
 #[test]
 fn without_maps_errors_are_hatched() {
@@ -89,7 +130,6 @@ fn without_maps_errors_are_hatched() {
         renderer.frame_with(&overlay, &shading, &target, None)
     };
     draw(32.0).unwrap();
-    let is_hatch = |c: &[u8; 4]| *c == [90, 90, 90, 255] || *c == [160, 160, 160, 255];
     let hatched = target.read(&GPU).unwrap().iter().filter(|c| is_hatch(c)).count();
     assert!(hatched > 1000, "{hatched}");
     for max in [1.0, -3.0, f32::NAN, f32::INFINITY] {
