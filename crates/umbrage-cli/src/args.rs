@@ -5,6 +5,7 @@ mod compare;
 mod info;
 mod picture;
 mod plan;
+mod session;
 mod technique;
 pub(crate) mod theory;
 mod view;
@@ -17,7 +18,8 @@ pub(crate) use view::{SceneArgs, SceneChangeArgs, ViewArgs};
 
 use crate::output;
 use clap::builder::PossibleValuesParser;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use session::Told;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -139,7 +141,9 @@ const MAIN_JOB: [&str; 3] = ["umbrage", "compare", "town"];
 pub(crate) fn parse(
     words: impl IntoIterator<Item = OsString>,
 ) -> Result<(Command, u8), clap::Error> {
-    let Cli { verbose, command } = Cli::try_parse_from(words)?;
+    let matches = Cli::command().try_get_matches_from(words)?;
+    let parsed = Cli::from_arg_matches(&matches);
+    let Cli { verbose, command } = parsed.map_err(|e| e.format(&mut Cli::command()))?;
     let Some(mut command) = command else {
         let main_job = MAIN_JOB.map(OsString::from);
         return parse(main_job).map(|(command, _)| (command, verbose));
@@ -151,6 +155,14 @@ pub(crate) fn parse(
         let topic = help.topic.iter().cloned();
         let words = ["umbrage".into()].into_iter().chain(topic).chain(["--help".into()]);
         return parse(words.collect::<Vec<OsString>>());
+    }
+    if let Some((_, own)) = matches.subcommand() {
+        match &mut command {
+            Command::Render(render) => render.scene.session.told = Told::of(own),
+            Command::Compare(compare) => compare.scene.session.told = Told::of(own),
+            Command::Plan(plan) => plan.session.told = Told::of(own),
+            _ => {}
+        }
     }
     let checked = match &mut command {
         Command::Render(render) => render.check(),
@@ -170,6 +182,18 @@ pub(crate) fn parse(
         clap::Error::raw(clap::error::ErrorKind::ValueValidation, output::one_line(&e))
     })?;
     Ok((command, verbose))
+}
+
+impl Command {
+    /// Takes up the session that the command line names, if it does.
+    pub(crate) fn take_session(&mut self) -> anyhow::Result<()> {
+        match self {
+            Self::Render(render) => render.take_session(),
+            Self::Compare(compare) => compare.take_session(),
+            Self::Plan(plan) => plan.take_session(),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Help {

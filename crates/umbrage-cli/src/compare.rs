@@ -3,7 +3,7 @@
 use crate::args;
 use crate::output::{aligned, command_line, note, print};
 use crate::progress::Bar;
-use crate::setup::{announce, open_scene, tell_notices};
+use crate::setup::{announce, open_changed, tell_notices};
 use anyhow::Result;
 use umbrage_lab::{
     Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, Progress,
@@ -15,7 +15,7 @@ use umbrage_measure::{Measured, Report, TruthKind};
 pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     let folder = ReportFolder::check(&args.output, Contents::COMPARISON)?;
     let bar = Bar::of_parts(quiet);
-    let scene = open_scene(&args.scene, &bar)?;
+    let scene = open_changed(args.scene.name(), &args.scene.changes, &bar)?;
     bar.stage("preparing the scene");
     let techniques = &args.comparison.techniques;
     let executors = Executors::open(techniques.execution.backend.into(), &techniques.shadows)?;

@@ -27,7 +27,7 @@ const USAGE_ERROR: u8 = 2;
 
 fn main() -> ExitCode {
     keep_drivers_quiet();
-    let (command, verbose) = match args::parse(std::env::args_os()) {
+    let (mut command, verbose) = match args::parse(std::env::args_os()) {
         Ok(parsed) => parsed,
         Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             return finish(output::print(&e.render().to_string()));
@@ -41,7 +41,11 @@ fn main() -> ExitCode {
     stop_without_traces();
     // Log lines would break a progress bar.
     let quiet = verbose > 0;
-    finish(match &command {
+    finish(command.take_session().and_then(|()| run(&command, quiet)))
+}
+
+fn run(command: &Command, quiet: bool) -> anyhow::Result<()> {
+    match command {
         Command::Render(args) => render::run(args, quiet),
         Command::Compare(args) => compare::run(args, quiet),
         Command::Sweep(args) => sweep::run(args, quiet),
@@ -56,7 +60,7 @@ fn main() -> ExitCode {
             output::print(&String::from_utf8_lossy(&args::completions(args.shell)))
         }
         Command::Help(_) => output::print(&umbrage::language::help()),
-    })
+    }
 }
 
 /// Switches off a Vulkan layer of Mesa. The layer asks the desktop which GPU it prefers, and prints

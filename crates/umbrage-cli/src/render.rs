@@ -3,7 +3,7 @@
 use crate::args::{self, Aov, PictureArgs, PictureKind};
 use crate::output::note;
 use crate::progress::Bar;
-use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_notices};
+use crate::setup::{Chosen, announce, choose, open_changed, tell_chosen, tell_notices};
 use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let pictures = args.pictures()?;
     pictures.iter().try_for_each(|p| check_file(&p.path))?;
     let bar = Bar::of_parts(quiet);
-    let scene = open_scene(&args.scene, &bar)?;
+    let scene = open_changed(args.scene.name(), &args.scene.changes, &bar)?;
     let Chosen { view: chosen, lights } =
         choose(&args.view, &[args.light.options()], Some(&scene), &bar)?;
     let light = lights[0].light;

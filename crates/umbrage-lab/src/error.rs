@@ -63,6 +63,8 @@ pub enum Field {
     Scenes,
     /// The folders of a sweep's shares, which are to be joined.
     Merge,
+    /// The file of a session.
+    Session,
 }
 
 impl Field {
@@ -96,6 +98,7 @@ impl Field {
             Self::Views => "views",
             Self::Scenes => "scenes",
             Self::Merge => "merge",
+            Self::Session => "session",
         }
     }
 

@@ -16,6 +16,7 @@
 //!   technique by this text.
 //! - [`Executors`] are what renders: the CPU reference and, if there is one, a GPU. A
 //!   [`RenderScene`] is a scene prepared for them.
+//! - A [`Session`] is all that is chosen, in a file.
 //! - [`PreparedScene`], [`Comparison`] and [`Compared`] compare techniques in one view; [`sweep()`]
 //!   compares them in many.
 //!
@@ -61,9 +62,11 @@ mod motion;
 mod picture;
 mod planning;
 mod prepared;
+mod presets;
 mod progress;
 mod receivers;
 mod scene;
+mod session;
 mod strip;
 mod sweep;
 mod technique;
@@ -83,9 +86,11 @@ pub use motion::{Motion, MovingView, Noise, flicker, noise};
 pub use picture::{Shadowed, Shape, Texels};
 pub use planning::{fade, milliseconds, plan, plan_fading, plan_with, planner};
 pub use prepared::PreparedScene;
+pub use presets::{PRESETS, Preset};
 pub use progress::Progress;
 pub use receivers::{Fit, Receivers, SURFACE_BOXES};
 pub use scene::{SceneOptions, open_scene};
+pub use session::Session;
 pub use strip::{Certainty, NOTHING_TO_SHADOW, Rows, Strip};
 pub use sweep::{Share, SweepOptions, join_shares, sweep};
 pub use technique::{NamedTechnique, TechniqueError};

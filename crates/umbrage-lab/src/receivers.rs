@@ -8,11 +8,12 @@ use umbrage_scene::Scene;
 use umbrage_trace::{Ray, Tracer};
 
 /// What shadow maps are fitted to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fit {
     /// The bounding box of the scene, empty space included.
     Box,
     /// Up to some hundred boxes around the scene's surfaces.
+    #[default]
     Surfaces,
     /// What each pixel of the picture shows.
     Seen,

@@ -37,8 +37,8 @@ pub use legend::with_legend;
 pub use maps::{difference_map, error_map, grey, noise_map, partition_map, texel_map};
 pub use metrics::{ErrorPx, Metrics, Spots, Tally, measure, measure_error_px};
 pub use page::{
-    FigureFile, FigureShown, FiguresPage, Page, SweepPage, quoted, write_figures, write_report,
-    write_sweep,
+    FigureFile, FigureShown, FiguresPage, Page, SweepPage, comma_separated, quoted, quoted_option,
+    write_figures, write_report, write_sweep,
 };
 pub use pictures::{Pictures, Seen, SeenTruth, write_pictures, write_truth_pictures};
 pub use report::{AreaTruth, LightInfo, Measured, Motion, Report, Times, Truth, TruthKind, View};

@@ -1,7 +1,8 @@
 //! `umbrage compare` and `umbrage sweep`: their options.
 
+use super::session::SessionSceneArgs;
 use super::technique::ComparisonArgs;
-use super::view::{DEFAULT_SIZE, LightArgs, SceneArgs, SceneChangeArgs, ViewArgs};
+use super::view::{DEFAULT_SIZE, LightArgs, SceneChangeArgs, ViewArgs};
 use crate::values;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -17,7 +18,7 @@ Examples:
       --eye 0,6,30 --target=-15,0,0 --near 0.25 --far 125 --sun=-0.58,-0.71,-0.41 --json")]
 pub(crate) struct Compare {
     #[command(flatten)]
-    pub(crate) scene: SceneArgs,
+    pub(crate) scene: SessionSceneArgs,
     /// Folder for the report; a former report there is replaced, anything else is not.
     #[arg(short, long, value_name = "DIR", default_value = "report")]
     pub(crate) output: PathBuf,
@@ -114,6 +115,24 @@ impl From<MotionArg> for Motion {
 }
 
 impl Compare {
+    /// Takes what is not asked for from the session, if there is one.
+    pub(super) fn take_session(&mut self) -> Result<()> {
+        let Some(session) = self.scene.session.read()? else { return Ok(()) };
+        let told = self.scene.session.told;
+        self.scene.take(&session);
+        self.light.take(session.light_options());
+        self.view.take(session.view, told.size);
+        let comparison = &mut self.comparison;
+        comparison.light_size = comparison.light_size.or(session.light_size);
+        if !told.shadows {
+            comparison.techniques.shadows = session.techniques;
+        }
+        if !told.fit {
+            comparison.techniques.fit = session.fit.into();
+        }
+        self.check()
+    }
+
     pub(super) fn check(&mut self) -> Result<()> {
         self.view.options().check()?;
         self.light.options().check()?;

@@ -1,7 +1,8 @@
 //! `umbrage render`: its options.
 
+use super::session::SessionSceneArgs;
 use super::technique::{ExecutionArgs, Fit, TexelArgs};
-use super::view::{LightArgs, SceneArgs, ViewArgs};
+use super::view::{LightArgs, ViewArgs};
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
@@ -19,7 +20,7 @@ Examples:
       --eye 0,2,5 --target 0,0,0 --sun=-0.5,-1,-0.3")]
 pub(crate) struct Render {
     #[command(flatten)]
-    pub(crate) scene: SceneArgs,
+    pub(crate) scene: SessionSceneArgs,
     /// Picture to write: .png, or .exr for raw floats. Of several --aov, each has its name added:
     /// town-truth.png. Left out: a new PNG named after the scene.
     #[arg(short, long, value_name = "FILE")]
@@ -99,6 +100,27 @@ impl Render {
         self.pictures().map(drop)
     }
 
+    /// Takes what is not asked for from the session, if there is one.
+    pub(super) fn take_session(&mut self) -> Result<()> {
+        let Some(session) = self.scene.session.read()? else { return Ok(()) };
+        let told = self.scene.session.told;
+        self.scene.take(&session);
+        self.light.take(session.light_options());
+        self.view.take(session.view, told.size);
+        if !told.shadows
+            && let Some(shown) = session.techniques.into_iter().next()
+        {
+            self.shadows = shown;
+        }
+        if !told.fit {
+            self.fit = session.fit.into();
+        }
+        if self.aov.iter().any(|aov| aov.shows_truth()) {
+            self.light_size = self.light_size.or(session.light_size);
+        }
+        self.check()
+    }
+
     /// The pictures to write, each with a file of its own.
     pub(crate) fn pictures(&self) -> Result<Vec<PictureArgs>> {
         let Some(output) = &self.output else { return Ok(self.new_pictures()) };
@@ -122,7 +144,7 @@ impl Render {
 
     /// PNGs that are named after the scene, none of which is there yet.
     fn new_pictures(&self) -> Vec<PictureArgs> {
-        let name = self.scene.name.split(':').next().unwrap_or_default();
+        let name = self.scene.name().split(':').next().unwrap_or_default();
         let stem = Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let numbered = (1..).map(|n| match n {
             1 => stem.clone(),

@@ -1,5 +1,6 @@
 //! `umbrage plan`: its options.
 
+use super::session::SessionArgs;
 use super::technique::{Fit, TexelArgs};
 use super::view::{LightsArgs, SceneChangeArgs, ViewArgs};
 use anyhow::{Result, ensure};
@@ -17,8 +18,10 @@ Examples:
 pub(crate) struct Plan {
     /// A .gltf or .glb file, or a built-in scene (`umbrage scenes` lists them). Without one, the
     /// whole view between --near and --far is served.
-    #[arg(value_name = "SCENE")]
+    #[arg(value_name = "SCENE", id = "name")]
     pub(crate) scene: Option<String>,
+    #[command(flatten)]
+    pub(crate) session: SessionArgs,
     #[command(flatten)]
     pub(crate) changes: SceneChangeArgs,
     /// How to make shadows, as in lispsm:pcf3@2048 (`umbrage help shadows` has all words).
@@ -40,11 +43,30 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// Takes what is not asked for from the session, if there is one.
+    pub(super) fn take_session(&mut self) -> Result<()> {
+        let Some(session) = self.session.read()? else { return Ok(()) };
+        let told = self.session.told;
+        self.changes.take(&session);
+        self.lights.take(session.light_options());
+        self.view.take(session.view, told.size);
+        self.scene = Some(session.scene);
+        if !told.shadows
+            && let Some(shown) = session.techniques.into_iter().next()
+        {
+            self.shadows = shown;
+        }
+        if !told.fit {
+            self.fit = session.fit.into();
+        }
+        self.check()
+    }
+
     pub(super) fn check(&mut self) -> Result<()> {
         self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.options().check()?;
         self.lights.check()?;
-        if self.scene.is_some() {
+        if self.scene.is_some() || self.session.is_some() {
             return Ok(());
         }
         let view = &self.view;

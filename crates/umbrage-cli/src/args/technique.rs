@@ -71,6 +71,16 @@ impl From<Fit> for umbrage_lab::Fit {
     }
 }
 
+impl From<umbrage_lab::Fit> for Fit {
+    fn from(fit: umbrage_lab::Fit) -> Self {
+        match fit {
+            umbrage_lab::Fit::Box => Self::Box,
+            umbrage_lab::Fit::Surfaces => Self::Surfaces,
+            umbrage_lab::Fit::Seen => Self::Seen,
+        }
+    }
+}
+
 impl ComparisonArgs {
     /// What to compare.
     pub(crate) fn options(&self) -> ComparisonOptions {

@@ -4,7 +4,7 @@ use crate::values;
 use anyhow::{Result, ensure};
 use clap::Args;
 use glam::DVec3;
-use umbrage_lab::{LightOptions, SceneOptions, ViewOptions};
+use umbrage_lab::{LightOptions, SceneOptions, Session, ViewOptions};
 
 /// Size of pictures where none is given.
 pub(super) const DEFAULT_SIZE: &str = "960x540";
@@ -39,6 +39,13 @@ impl SceneChangeArgs {
     /// How the scene is changed when it is opened.
     pub(crate) fn options(&self) -> SceneOptions {
         SceneOptions { without: self.without.clone(), ground: self.ground }
+    }
+
+    /// Adds the changes of a session.
+    pub(super) fn take(&mut self, session: &Session) {
+        self.opaque |= session.opaque;
+        self.ground |= session.changes.ground;
+        self.without.extend_from_slice(&session.changes.without);
     }
 }
 
@@ -138,10 +145,41 @@ impl ViewArgs {
     }
 }
 
+impl ViewArgs {
+    /// Takes from a session's view what is not asked for.
+    pub(super) fn take(&mut self, view: ViewOptions, is_size_told: bool) {
+        if !is_size_told {
+            self.size = view.size;
+        }
+        // A camera of the scene has a whole view.
+        if self.camera.is_some() {
+            return;
+        }
+        if self.eye.or(self.target).or(self.up).is_none() {
+            self.camera = view.camera;
+        }
+        if self.fov.or(self.ortho).is_none() {
+            (self.fov, self.ortho) = (view.fov_deg, view.ortho);
+        }
+        self.eye = self.eye.or(view.eye);
+        self.target = self.target.or(view.target);
+        self.up = self.up.or(view.up);
+        self.near = self.near.or(view.near);
+        self.far = self.far.or(view.far);
+    }
+}
+
 impl LightArgs {
     /// The light that is asked for.
     pub(crate) fn options(&self) -> LightOptions {
         LightOptions { sun: self.sun.or(self.sun_angles), light: self.light.clone() }
+    }
+
+    /// Takes a session's light if none is asked for.
+    pub(super) fn take(&mut self, session: LightOptions) {
+        if self.options() == LightOptions::default() {
+            (self.sun, self.light) = (session.sun, session.light);
+        }
     }
 }
 
@@ -158,6 +196,13 @@ impl LightsArgs {
             vec![one(None)]
         } else {
             self.light.iter().cloned().map(Some).map(one).collect()
+        }
+    }
+
+    /// Takes a session's light if none is asked for.
+    pub(super) fn take(&mut self, session: LightOptions) {
+        if self.each() == [LightOptions::default()] {
+            (self.sun, self.light) = (session.sun, session.light.into_iter().collect());
         }
     }
 

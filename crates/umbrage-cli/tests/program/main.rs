@@ -15,5 +15,6 @@ mod plan;
 mod render;
 mod scene_options;
 mod scenes;
+mod session;
 mod sweep;
 mod theory;

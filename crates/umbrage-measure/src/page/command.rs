@@ -12,6 +12,16 @@ pub fn quoted(word: &str) -> String {
     }
 }
 
+/// An option with its value as a shell takes it: `--camera='the gate'`.
+pub fn quoted_option(name: &str, value: &str) -> String {
+    format!("--{name}={}", quoted(value))
+}
+
+/// A vector as options take it: `0,1.5,-4`.
+pub fn comma_separated(v: [f64; 3]) -> String {
+    v.map(|n| n.to_string()).join(",")
+}
+
 /// The command that renders a technique in the scene's own view and light.
 pub(super) fn render(scene: &str, technique: &str) -> String {
     let [scene, technique] = [scene, technique].map(quoted);
@@ -20,18 +30,18 @@ pub(super) fn render(scene: &str, technique: &str) -> String {
 
 /// The command that renders a technique in the view and light of a report.
 pub(super) fn render_as(report: &Report, technique: &str) -> String {
-    let numbers = |v: [f64; 3]| v.map(|n| n.to_string()).join(",");
     let view = &report.view;
     let [width, height] = report.size;
     let mut command = render(&report.scene, technique);
-    let mut add = |option: &str, value: &str| command += &format!(" --{option}={}", quoted(value));
+    let mut add =
+        |option: &str, value: &str| command += &format!(" {}", quoted_option(option, value));
     match &view.name {
         Some(name) => add("camera", name),
         None => {
-            add("eye", &numbers(view.eye));
-            add("target", &numbers(view.target));
+            add("eye", &comma_separated(view.eye));
+            add("target", &comma_separated(view.target));
             if view.up != [0.0, 1.0, 0.0] {
-                add("up", &numbers(view.up));
+                add("up", &comma_separated(view.up));
             }
             let lens = [("fov", view.fov), ("ortho", view.ortho)];
             let range = [("near", Some(view.near)), ("far", Some(view.far))];
@@ -41,7 +51,9 @@ pub(super) fn render_as(report: &Report, technique: &str) -> String {
         }
     }
     match &report.light {
-        LightInfo::Directional { name: None, direction } => add("sun", &numbers(*direction)),
+        LightInfo::Directional { name: None, direction } => {
+            add("sun", &comma_separated(*direction))
+        }
         LightInfo::Directional { name: Some(name), .. }
         | LightInfo::Spot { name: Some(name), .. }
         | LightInfo::Point { name: Some(name), .. } => add("light", name),

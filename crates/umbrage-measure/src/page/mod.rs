@@ -12,7 +12,7 @@ mod view;
 use crate::{Error, ErrorScale, Pictures, Report, write_file};
 use askama::Template;
 pub(crate) use chart::{Tick, ticks};
-pub use command::quoted;
+pub use command::{comma_separated, quoted, quoted_option};
 pub use figures::{FigureFile, FigureShown, FiguresPage, write_figures};
 use std::path::Path;
 pub use sweep::{SweepPage, write_sweep};
