@@ -9,12 +9,14 @@ mod session;
 mod technique;
 pub(crate) mod theory;
 mod view;
+mod window;
 
 pub(crate) use compare::{Compare, Sweep};
 pub(crate) use info::Info;
 pub(crate) use picture::{Aov, PictureArgs, PictureKind, Render};
 pub(crate) use plan::Plan;
 pub(crate) use view::{SceneArgs, SceneChangeArgs, ViewArgs};
+pub(crate) use window::Window;
 
 use crate::output;
 use clap::builder::PossibleValuesParser;
@@ -57,6 +59,8 @@ pub(crate) enum Command {
     Compare(Compare),
     /// Compare techniques in many views, with means over all.
     Sweep(Sweep),
+    /// Open a window in which techniques are tried and compared, moving.
+    View(Window),
     /// Print the matrices, resolutions and errors that an engine needs.
     Plan(Plan),
     /// Tell what is in a scene: cameras, lights, sizes, and the view and light that would be taken.
@@ -172,6 +176,7 @@ pub(crate) fn parse(
         Command::Info(info) => info.check(),
         Command::Scenes(_)
         | Command::Figures(_)
+        | Command::View(_)
         | Command::Devices(_)
         | Command::Completions(_)
         | Command::Help(_) => Ok(()),

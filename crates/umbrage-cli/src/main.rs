@@ -17,6 +17,7 @@ mod setup;
 mod sweep;
 mod theory;
 mod values;
+mod view;
 
 use args::Command;
 use clap::error::ErrorKind;
@@ -55,6 +56,7 @@ fn run(command: &Command, quiet: bool) -> anyhow::Result<()> {
         Command::Figures(args) => figures::run(args, quiet),
         Command::Theory(args) => theory::run(args),
         Command::Bench(args) => bench::run(args, quiet),
+        Command::View(args) => view::run(args),
         Command::Devices(args) => devices::run(args),
         Command::Completions(args) => {
             output::print(&String::from_utf8_lossy(&args::completions(args.shell)))

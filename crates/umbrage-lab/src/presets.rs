@@ -25,11 +25,6 @@ pub const PRESETS: &[Preset] = &[
         meaning: "Penumbrae of the sun, which widen with the distance of what casts them.",
     },
     Preset {
-        name: "smooth",
-        shadows: "adaptive+z4:msm(blur=2px)@2048",
-        meaning: "Edges blurred over two pixels of the picture, the same near and far, ahead of lookup.",
-    },
-    Preset {
         name: "stable",
         shadows: "uniform(stable)+z4(practical=0.65,overlap=0.1):pcf3@2048",
         meaning: "Shadows that do not shimmer when the camera moves, at the price of coarser texels.",

@@ -8,7 +8,8 @@ use wgpu::{
     InstanceDescriptor, MemoryHints, PollType, Queue, TextureUsages, Trace,
 };
 
-/// A GPU device, with or without a window.
+/// A GPU device, with or without a window. Clones share it.
+#[derive(Clone)]
 pub struct Gpu {
     device: Device,
     queue: Queue,

@@ -18,7 +18,10 @@ pub(crate) enum Action {
     Wipe(f32),
     Overlay(OverlayKind),
     Fit(Fit),
-    Sun { azimuth_deg: f64, elevation_deg: f64 },
+    Sun {
+        azimuth_deg: f64,
+        elevation_deg: f64,
+    },
     Hour(f64),
     Headlight,
     /// A light of the scene, by the word that chooses it.
@@ -118,7 +121,8 @@ impl Action {
     /// # Errors
     /// Tells what is wrong with them.
     pub(crate) fn parse(words: &str) -> Result<Self, String> {
-        let (verb, rest) = words.trim().split_once(char::is_whitespace).unwrap_or((words.trim(), ""));
+        let (verb, rest) =
+            words.trim().split_once(char::is_whitespace).unwrap_or((words.trim(), ""));
         let rest = rest.trim();
         let text = || match rest {
             "" => Err(format!("`{verb}` needs a value")),
@@ -170,8 +174,11 @@ impl Action {
             "try-these" => Self::TryThese,
             "preset" => Self::Preset(text()?),
             "theme" => {
-                let themes =
-                    [(Theme::Dark, "dark", ""), (Theme::Light, "light", ""), (Theme::System, "system", "")];
+                let themes = [
+                    (Theme::Dark, "dark", ""),
+                    (Theme::Light, "light", ""),
+                    (Theme::System, "system", ""),
+                ];
                 Self::Theme(chosen(verb, rest, &themes)?)
             }
             "scale" => Self::Scale(numbers::<1>(verb, rest)?[0] as f32),
@@ -231,7 +238,10 @@ mod tests {
     #[test]
     fn actions_are_parsed() {
         let parse = |words| Action::parse(words).unwrap();
-        assert_eq!(parse("technique lispsm+z2 :pcf3"), Action::Technique(0, "lispsm+z2 :pcf3".into()));
+        assert_eq!(
+            parse("technique lispsm+z2 :pcf3"),
+            Action::Technique(0, "lispsm+z2 :pcf3".into())
+        );
         assert_eq!(parse("compare side by side"), Action::Compare(Compare::Beside));
         assert_eq!(parse("panel shadow map off"), Action::Panel(Panel::Map, false));
         assert_eq!(parse("panel theory on"), Action::Panel(Panel::Theory, true));

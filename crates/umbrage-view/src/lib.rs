@@ -8,6 +8,7 @@ mod action;
 mod app;
 mod pose;
 mod script;
+mod session;
 mod settings;
 mod stage;
 mod sun;

@@ -135,9 +135,7 @@ impl Command {
 
 impl Wait {
     fn parse(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!("`wait` takes ready, truth, jobs, 40 frames or 1.5 s, not `{text}`")
-        };
+        let wrong = || format!("`wait` takes ready, truth, jobs, 40 frames or 1.5 s, not `{text}`");
         Ok(match text {
             "ready" => Self::Ready,
             "truth" => Self::Truth,

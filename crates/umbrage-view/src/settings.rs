@@ -3,7 +3,6 @@
 use crate::pose::Pose;
 use crate::stage::{Overlay, Request, SceneInfo, Shining};
 use crate::sun::Sun;
-use std::path::PathBuf;
 use umbrage::visibility::LightSize;
 use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
 use umbrage_lab::{Fit, NamedTechnique, SceneOptions};
@@ -12,8 +11,6 @@ use umbrage_scene::Lens;
 /// The state of a window that a session can keep.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
-    /// The folder that a relative path of a scene begins in.
-    pub(crate) folder: PathBuf,
     /// A path, or the name of a built-in scene.
     pub(crate) scene: String,
     pub(crate) changes: SceneOptions,
@@ -126,7 +123,6 @@ impl Settings {
     /// The settings of a scene that is about to be opened.
     pub(crate) fn new(scene: &str) -> Self {
         Self {
-            folder: PathBuf::new(),
             scene: scene.to_owned(),
             changes: SceneOptions::default(),
             opaque: false,
@@ -154,16 +150,22 @@ impl Settings {
     /// Takes the view and the light that a scene begins with.
     pub(crate) fn begin_with(&mut self, info: &SceneInfo) {
         self.look_from(info.view_name.clone(), &info.view);
+        self.shine(info);
+        self.frozen = None;
+        self.clip = None;
+        self.is_playing = false;
+    }
+
+    /// Takes the light that a scene begins with.
+    pub(crate) fn shine(&mut self, info: &SceneInfo) {
         self.light = match (&info.light_name, info.light) {
             (Some(name), _) => LightSetting::Named(name.clone()),
             (None, Light::Directional { direction }) => {
                 LightSetting::Sun(Sun::from_direction(direction))
             }
+            // A lamp of the scene has a name.
             (None, _) => LightSetting::Headlight,
         };
-        self.frozen = None;
-        self.clip = None;
-        self.is_playing = false;
     }
 
     /// Takes a view, which is that of the scene's camera of this name, if there is a name.
@@ -188,7 +190,11 @@ impl Settings {
     ///
     /// # Errors
     /// Names the value that no camera can have.
-    pub(crate) fn camera(&self, info: &SceneInfo, image: [u32; 2]) -> Result<Camera, umbrage::Error> {
+    pub(crate) fn camera(
+        &self,
+        info: &SceneInfo,
+        image: [u32; 2],
+    ) -> Result<Camera, umbrage::Error> {
         self.camera_at(&self.pose, info, image)
     }
 
@@ -221,14 +227,22 @@ impl Settings {
     /// The light of a frame.
     pub(crate) fn light(&self, info: &SceneInfo) -> Shining {
         let sun = |direction| Shining::Light(Light::Directional { direction });
-        match &self.light {
-            LightSetting::Sun(at) => sun(at.direction()),
-            LightSetting::Hour(hour) => sun(Sun::at_hour(*hour).direction()),
-            LightSetting::Headlight => sun(self.pose.forward()),
-            LightSetting::Named(word) => {
+        match (self.sun(), &self.light) {
+            (Some(at), _) => sun(at.direction()),
+            (None, LightSetting::Named(word)) => {
                 let index = info.lights.iter().position(|(name, _)| name == word);
                 index.map_or(Shining::Light(info.light), Shining::OfScene)
             }
+            (None, _) => sun(self.pose.forward()),
+        }
+    }
+
+    /// The sun, if one shines.
+    pub(crate) fn sun(&self) -> Option<Sun> {
+        match self.light {
+            LightSetting::Sun(sun) => Some(sun),
+            LightSetting::Hour(hour) => Some(Sun::at_hour(hour)),
+            LightSetting::Headlight | LightSetting::Named(_) => None,
         }
     }
 
@@ -287,7 +301,8 @@ fn depth_range(camera: &Camera, info: &SceneInfo) -> [f64; 2] {
         return [0.0, far];
     }
     let sides = side_planes(camera);
-    let seen = info.boxes.iter().filter(|b| !b.is_empty() && sides.iter().all(|p| p.may_touch(**b)));
+    let seen =
+        info.boxes.iter().filter(|b| !b.is_empty() && sides.iter().all(|p| p.may_touch(**b)));
     let nearest = seen.flat_map(depths).fold(f64::INFINITY, f64::min);
     [nearest.clamp(far / RATIO, far / 4.0) * 0.99, far]
 }

@@ -3,11 +3,12 @@
 use crate::Outcome;
 use crate::app::{App, Driver, Kept, Message, Shown};
 use crate::script;
+use crate::session::to_open;
 use crate::settings::Settings;
 use eframe::{NativeOptions, Renderer};
 use egui::ViewportBuilder;
 use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use umbrage_render::Gpu;
 
@@ -64,7 +65,19 @@ pub fn run(options: &Options) -> Result<(), Error> {
             Some(Driver::new(steps, folder.clone()))
         }
     };
-    let mut kept = Kept::new(&options.scene, script);
+    let settings = Settings::new(&options.scene);
+    let (to_open, message) = match to_open(Path::new(&options.scene), &settings) {
+        Ok(to_open) => (Some(to_open), None),
+        Err(problem) => (None, Some(Message::new(problem, true))),
+    };
+    let mut kept = Kept {
+        settings,
+        shown: Shown::default(),
+        message,
+        driver: script,
+        outcome: Outcome::Closed,
+        to_open,
+    };
     for _ in 0..=MOST_LOSSES {
         kept.outcome = Outcome::Closed;
         open(&mut kept)?;
@@ -110,23 +123,10 @@ fn open(kept: &mut Kept) -> Result<(), Error> {
         },
         ..NativeOptions::default()
     };
-    let made = Box::new(|context: &eframe::CreationContext<'_>| {
+    let made: eframe::AppCreator<'_> = Box::new(move |context| {
         let state = context.wgpu_render_state.clone().ok_or("no device for the window")?;
         let app = App::new(kept, &context.egui_ctx, state)?;
         Ok(Box::new(app) as Box<dyn eframe::App + '_>)
     });
     eframe::run_native("Umbrage", options, made).map_err(|e| Error::NoWindow(e.to_string()))
-}
-
-impl Kept {
-    fn new(scene: &str, driver: Option<Driver>) -> Self {
-        Self {
-            settings: Settings::new(scene),
-            shown: Shown::default(),
-            message: None::<Message>,
-            driver,
-            outcome: Outcome::Closed,
-            keeps_view: false,
-        }
-    }
 }

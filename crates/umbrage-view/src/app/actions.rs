@@ -2,13 +2,14 @@
 
 use super::{App, technique::Draft};
 use crate::action::{Action, Copied, Panel, Theme};
+use crate::session::to_open;
 use crate::settings::{LightSetting, TRUTH};
 use crate::stage::Job;
 use crate::sun::Sun;
 use egui::{Context, ThemePreference};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
-use umbrage_lab::{NamedTechnique, presets};
+use umbrage_lab::{NamedTechnique, PRESETS, Session};
 use umbrage_scene::Lens;
 
 impl App<'_> {
@@ -45,7 +46,9 @@ impl App<'_> {
             }
             Action::Hour(hour) => {
                 if Sun::at_hour(hour).elevation_deg <= 0.0 {
-                    return Err(format!("at {hour} the sun is below the horizon; take 4.5 to 19.5"));
+                    return Err(format!(
+                        "at {hour} the sun is below the horizon; take 4.5 to 19.5"
+                    ));
                 }
                 settings.light = LightSetting::Hour(hour);
             }
@@ -54,7 +57,10 @@ impl App<'_> {
                 let info = self.info.as_ref().ok_or("no scene is open")?;
                 if !info.lights.iter().any(|(name, _)| *name == word) {
                     let names: Vec<&str> = info.lights.iter().map(|(n, _)| n.as_str()).collect();
-                    return Err(format!("the scene has no light `{word}`; it has {}", listed(&names)));
+                    return Err(format!(
+                        "the scene has no light `{word}`; it has {}",
+                        listed(&names)
+                    ));
                 }
                 settings.light = LightSetting::Named(word);
             }
@@ -63,7 +69,10 @@ impl App<'_> {
                 let info = self.info.clone().ok_or("no scene is open")?;
                 let Some((name, view)) = info.cameras.iter().find(|(name, _)| *name == word) else {
                     let names: Vec<&str> = info.cameras.iter().map(|(n, _)| n.as_str()).collect();
-                    return Err(format!("the scene has no camera `{word}`; it has {}", listed(&names)));
+                    return Err(format!(
+                        "the scene has no camera `{word}`; it has {}",
+                        listed(&names)
+                    ));
                 };
                 settings.look_from(Some(name.clone()), view);
             }
@@ -141,9 +150,9 @@ impl App<'_> {
                 self.measure_presets();
             }
             Action::Preset(name) => {
-                let preset = presets().iter().find(|preset| preset.name == name);
+                let preset = PRESETS.iter().find(|preset| preset.name == name);
                 let preset = preset.ok_or_else(|| format!("there is no preset `{name}`"))?;
-                return self.try_to(context, Action::Technique(0, preset.technique.to_owned()));
+                return self.try_to(context, Action::Technique(0, preset.shadows.to_owned()));
             }
             Action::Theme(theme) => {
                 self.kept.shown.theme = match theme {
@@ -171,7 +180,7 @@ impl App<'_> {
                 let technique = self.kept.settings.techniques[0].clone();
                 let text = match what {
                     Copied::Specification => technique,
-                    Copied::Command => self.session()?.command_line(),
+                    Copied::Command => self.session()?.render_command(),
                     Copied::Code => {
                         let technique: NamedTechnique =
                             technique.parse().map_err(|e| format!("{e}"))?;
@@ -201,9 +210,16 @@ impl App<'_> {
         Ok(())
     }
 
+    /// What is set, as a session.
+    fn session(&self) -> Result<Session, String> {
+        let info = self.info.as_ref().ok_or("no scene is open")?;
+        self.kept.settings.session(info, self.image)
+    }
+
     /// Opens a scene or a session.
     fn open_path(&mut self, path: &Path) -> Result<(), String> {
-        let _ = path;
+        let to_open = to_open(path, &self.kept.settings)?;
+        self.open(to_open);
         Ok(())
     }
 }

@@ -46,11 +46,11 @@ impl Tip for Response {
 pub(super) struct Tipped(pub(super) HashSet<Id>);
 
 pub(super) fn tipped_id() -> Id {
-    Id::new("controls with tooltips")
+    Id::unique("controls with tooltips")
 }
 
 fn hint_id() -> Id {
-    Id::new("hint")
+    Id::unique("hint")
 }
 
 fn note_tip(response: &Response) {
@@ -195,7 +195,7 @@ impl App<'_> {
             .show_ui(ui, |ui| {
                 for builtin in umbrage_scene::builtins() {
                     let is_shown = builtin.name == self.kept.settings.scene;
-                    if ui.selectable_label(is_shown, builtin.name).tip(builtin.description).clicked() {
+                    if ui.selectable_label(is_shown, builtin.name).tip(builtin.about).clicked() {
                         open = Some(builtin.name.to_owned());
                     }
                 }
@@ -205,7 +205,8 @@ impl App<'_> {
         ui.horizontal(|ui| {
             let field = TextEdit::singleline(&mut self.path).hint_text("a .glb or session file");
             let field = field.desired_width(ui.available_width() - 60.0);
-            let response = ui.add(field).tip("A path of a scene or session, or a built-in scene's name.");
+            let response =
+                ui.add(field).tip("A path of a scene or session, or a built-in scene's name.");
             let is_entered = response.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
             if ui.button("open").tip("Open what the field names.").clicked() || is_entered {
                 open = Some(self.path.clone());
@@ -214,7 +215,9 @@ impl App<'_> {
         if let Some(name) = open {
             self.act(ui.ctx(), Action::Open(name.into()));
         }
-        if self.opening.is_some() && ui.button("stop opening").tip("Keep the present scene.").clicked() {
+        if self.opening.is_some()
+            && ui.button("stop opening").tip("Keep the present scene.").clicked()
+        {
             self.stage.cancel();
             self.opening = None;
         }
@@ -299,7 +302,10 @@ impl App<'_> {
                 .tip("What the maps are fitted to.");
             let mut counts = self.kept.settings.counts_errors;
             let check = ui.checkbox(&mut counts, "count errors");
-            if check.tip("Trace the truth and count wrong pixels while the view rests (N).").changed() {
+            if check
+                .tip("Trace the truth and count wrong pixels while the view rests (N).")
+                .changed()
+            {
                 actions.push(Action::CountErrors(counts));
             }
         });
@@ -332,12 +338,15 @@ impl App<'_> {
         ComboBox::from_id_salt("light")
             .selected_text(name)
             .show_ui(ui, |ui| {
-                let angles = ui.selectable_label(matches!(light, LightSetting::Sun(_)), "sun by angles");
+                let angles =
+                    ui.selectable_label(matches!(light, LightSetting::Sun(_)), "sun by angles");
                 if angles.tip("A sun by azimuth and elevation.").clicked() {
                     actions.push(sun_action(sun));
                 }
-                let hour =
-                    ui.selectable_label(matches!(light, LightSetting::Hour(_)), "sun by the time of day");
+                let hour = ui.selectable_label(
+                    matches!(light, LightSetting::Hour(_)),
+                    "sun by the time of day",
+                );
                 if hour.tip("A sun on the longest day, 45° north.").clicked() {
                     actions.push(Action::Hour(15.0));
                 }
@@ -356,8 +365,10 @@ impl App<'_> {
             .tip("Choose where the light comes from; Alt and drag moves the sun.");
         match light {
             LightSetting::Sun(Sun { mut azimuth_deg, mut elevation_deg }) => {
-                let azimuth = Slider::new(&mut azimuth_deg, 0.0..=360.0).suffix("°").text("azimuth");
-                let azimuth = ui.add(azimuth).tip("Where the sun stands, clockwise from north (−z).");
+                let azimuth =
+                    Slider::new(&mut azimuth_deg, 0.0..=360.0).suffix("°").text("azimuth");
+                let azimuth =
+                    ui.add(azimuth).tip("Where the sun stands, clockwise from north (−z).");
                 let elevation =
                     Slider::new(&mut elevation_deg, 0.0..=90.0).suffix("°").text("elevation");
                 let elevation = ui.add(elevation).tip("How high the sun stands above the horizon.");
@@ -366,9 +377,10 @@ impl App<'_> {
                 }
             }
             LightSetting::Hour(mut hour) => {
-                let slider = Slider::new(&mut hour, 4.5..=19.5).text("hour").custom_formatter(|h, _| {
-                    format!("{:02}:{:02}", h.trunc(), (h.fract() * 60.0).trunc())
-                });
+                let slider =
+                    Slider::new(&mut hour, 4.5..=19.5).text("hour").custom_formatter(|h, _| {
+                        format!("{:02}:{:02}", h.trunc(), (h.fract() * 60.0).trunc())
+                    });
                 if ui.add(slider).tip("The time of day by the sun; 12 is noon.").changed() {
                     actions.push(Action::Hour(hour));
                 }
@@ -391,12 +403,14 @@ impl App<'_> {
             }
             let new = match size {
                 Some(LightSize::Degrees(mut degrees)) => {
-                    let drag = DragValue::new(&mut degrees).range(0.01..=90.0).speed(0.02).suffix("°");
+                    let drag =
+                        DragValue::new(&mut degrees).range(0.01..=90.0).speed(0.02).suffix("°");
                     let row = ui.add(drag).tip("The angle that the sun's disc takes up.");
                     row.changed().then_some(LightSize::Degrees(degrees))
                 }
                 Some(LightSize::Metres(mut metres)) => {
-                    let drag = DragValue::new(&mut metres).range(0.001..=1e6).speed(0.01).suffix(" m");
+                    let drag =
+                        DragValue::new(&mut metres).range(0.001..=1e6).speed(0.01).suffix(" m");
                     let row = ui.add(drag).tip("The diameter of the lamp.");
                     row.changed().then_some(LightSize::Metres(metres))
                 }
@@ -429,7 +443,11 @@ impl App<'_> {
                     .tip("Choose one of the scene's cameras.");
             }
             let mut is_flying = settings.is_flying;
-            if ui.selectable_label(!is_flying, "orbit").tip("Dragging moves around the target.").clicked() {
+            if ui
+                .selectable_label(!is_flying, "orbit")
+                .tip("Dragging moves around the target.")
+                .clicked()
+            {
                 is_flying = false;
             }
             if ui.selectable_label(is_flying, "fly").tip("Dragging turns the head.").clicked() {
@@ -438,15 +456,24 @@ impl App<'_> {
             if is_flying != settings.is_flying {
                 actions.push(Action::Fly(is_flying));
             }
-            if ui.button("reset").tip("Go back to the view and light of the beginning (R).").clicked() {
+            if ui
+                .button("reset")
+                .tip("Go back to the view and light of the beginning (R).")
+                .clicked()
+            {
                 actions.push(Action::Reset);
             }
         });
         match settings.lens {
             Lens::Perspective { fov_y_rad } => {
                 let mut degrees = fov_y_rad.to_degrees();
-                let slider = Slider::new(&mut degrees, 5.0..=120.0).suffix("°").text("field of view");
-                if ui.add(slider).tip("The angle from the bottom to the top of the picture.").changed() {
+                let slider =
+                    Slider::new(&mut degrees, 5.0..=120.0).suffix("°").text("field of view");
+                if ui
+                    .add(slider)
+                    .tip("The angle from the bottom to the top of the picture.")
+                    .changed()
+                {
                     actions.push(Action::Fov(degrees));
                 }
                 if ui.button("orthographic").tip("Make distance shrink nothing.").clicked() {
@@ -455,8 +482,13 @@ impl App<'_> {
                 }
             }
             Lens::Orthographic { mut height } => {
-                let drag = DragValue::new(&mut height).range(1e-6..=1e9).speed(height * 0.01);
-                if ui.add(drag.suffix(" m high")).tip("How much the picture shows from bottom to top.").changed() {
+                let speed = height * 0.01;
+                let drag = DragValue::new(&mut height).range(1e-6..=1e9).speed(speed);
+                if ui
+                    .add(drag.suffix(" m high"))
+                    .tip("How much the picture shows from bottom to top.")
+                    .changed()
+                {
                     actions.push(Action::Ortho(height));
                 }
                 if ui.button("perspective").tip("Make what is far smaller.").clicked() {
@@ -466,7 +498,11 @@ impl App<'_> {
         }
         let mut percent = settings.resolution * 100.0;
         let slider = Slider::new(&mut percent, 10.0..=100.0).suffix("%").text("resolution");
-        if ui.add(slider).tip("The share of the window's pixels that are drawn; fewer are faster.").changed() {
+        if ui
+            .add(slider)
+            .tip("The share of the window's pixels that are drawn; fewer are faster.")
+            .changed()
+        {
             actions.push(Action::Resolution(percent / 100.0));
         }
         if let Some(frame) = &self.frame {
@@ -491,14 +527,19 @@ impl App<'_> {
             }
         });
         ui.horizontal_wrapped(|ui| {
-            if ui.button("save picture").tip("Save the first picture as a PNG (ctrl+P).").clicked() {
+            if ui.button("save picture").tip("Save the first picture as a PNG (ctrl+P).").clicked()
+            {
                 actions.push(Action::Save("umbrage-view.png".into()));
             }
             let turn = ui.button("turntable").tip("Save 36 pictures of a turn around the target.");
             if turn.clicked() {
                 actions.push(Action::Turntable(36, "umbrage-turntable".into()));
             }
-            if ui.button("save session").tip("Save all that is set, to open it again (ctrl+S).").clicked() {
+            if ui
+                .button("save session")
+                .tip("Save all that is set, to open it again (ctrl+S).")
+                .clicked()
+            {
                 actions.push(Action::SaveSession("umbrage-session.json".into()));
             }
         });
@@ -513,7 +554,8 @@ pub(super) fn sun_action(sun: Sun) -> Action {
 
 /// A part of the panel that can be closed.
 fn section(ui: &mut Ui, title: &str, tip: &str, contents: impl FnOnce(&mut Ui)) {
-    let header = CollapsingHeader::new(RichText::new(title).strong()).default_open(true).show(ui, contents);
+    let header =
+        CollapsingHeader::new(RichText::new(title).strong()).default_open(true).show(ui, contents);
     header.header_response.tip(tip);
 }
 

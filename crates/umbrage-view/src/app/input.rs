@@ -44,12 +44,11 @@ pub(super) const KEYS: &[(&str, &str)] = &[
 impl App<'_> {
     /// The sun that shines, or the one that would if there is another light.
     pub(super) fn sun(&self) -> Sun {
-        match &self.kept.settings.light {
-            LightSetting::Sun(sun) => *sun,
-            LightSetting::Hour(hour) => Sun::at_hour(*hour),
+        let other = || match &self.kept.settings.light {
             LightSetting::Headlight => Sun::from_direction(self.kept.settings.pose.forward()),
-            LightSetting::Named(_) => Sun { azimuth_deg: 135.0, elevation_deg: 45.0 },
-        }
+            _ => Sun { azimuth_deg: 135.0, elevation_deg: 45.0 },
+        };
+        self.kept.settings.sun().unwrap_or_else(other)
     }
 
     fn turn_sun(&mut self, ui: &egui::Context, by: [f64; 2]) {

@@ -42,9 +42,18 @@ fn color([r, g, b]: Rgb) -> Color32 {
 
 /// The edges of a box whose corners are numbered by bits.
 const BOX_EDGES: [[usize; 2]; 12] = [
-    [0, 1], [2, 3], [4, 5], [6, 7],
-    [0, 2], [1, 3], [4, 6], [5, 7],
-    [0, 4], [1, 5], [2, 6], [3, 7],
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
 ];
 
 /// The edges of a camera's frustum, world space, metres.
@@ -108,7 +117,8 @@ pub(super) fn paint_from_light(
     towards: DVec3,
     up: DVec3,
 ) {
-    let right = towards.cross(up).try_normalize().unwrap_or_else(|| towards.any_orthonormal_vector());
+    let right =
+        towards.cross(up).try_normalize().unwrap_or_else(|| towards.any_orthonormal_vector());
     let up = right.cross(towards);
     let flat = |p: DVec3| DVec2::new(p.dot(right), -p.dot(up));
     let points = || lines.iter().flat_map(|line| line.ends.map(flat));
@@ -174,11 +184,16 @@ pub(super) fn paint_legend(painter: &Painter, rect: Rect, overlay: OverlayKind, 
 pub(super) fn paint_rows(painter: &Painter, rect: Rect, rows: &[(Color32, String)]) {
     const ROW: f32 = 18.0;
     let height = ROW * rows.len() as f32 + 10.0;
-    let area = Rect::from_min_size(rect.left_bottom() - vec2(-8.0, height + 8.0), vec2(210.0, height));
+    let area =
+        Rect::from_min_size(rect.left_bottom() - vec2(-8.0, height + 8.0), vec2(210.0, height));
     painter.rect_filled(area, 4.0, Color32::from_black_alpha(190));
     for (i, (color, meaning)) in rows.iter().enumerate() {
         let at = area.min + vec2(8.0, 5.0 + ROW * i as f32);
-        painter.rect_filled(Rect::from_min_size(at + vec2(0.0, 3.0), vec2(12.0, 12.0)), 2.0, *color);
+        painter.rect_filled(
+            Rect::from_min_size(at + vec2(0.0, 3.0), vec2(12.0, 12.0)),
+            2.0,
+            *color,
+        );
         let font = FontId::proportional(13.0);
         painter.text(at + vec2(20.0, 0.0), Align2::LEFT_TOP, meaning, font, Color32::WHITE);
     }
@@ -215,7 +230,9 @@ fn paint_scale(painter: &Painter, rect: Rect) {
         let stripe = Rect::from_min_size(bar.min + vec2(i as f32, 0.0), vec2(1.5, bar.height()));
         painter.rect_filled(stripe, 0.0, color(scale.color(error).unwrap_or_default()));
     }
-    for (label, error) in [("1/32", 1.0 / 32.0), ("1/8", 0.125), ("1", 1.0), ("8", 8.0), ("32", 32.0)] {
+    for (label, error) in
+        [("1/32", 1.0 / 32.0), ("1/8", 0.125), ("1", 1.0), ("8", 8.0), ("32", 32.0)]
+    {
         let x = bar.left() + (f32::ln(error) / scale.max().ln() * 0.5 + 0.5) * bar.width();
         let at = Pos2::new(x, bar.bottom() + 2.0);
         painter.text(at, Align2::CENTER_TOP, label, font.clone(), Color32::WHITE);
@@ -247,7 +264,8 @@ mod tests {
         assert!(middle.iter().all(|p| p.distance(DVec2::new(100.0, 50.0)) < 1e-9));
         assert!(in_picture(&camera, [DVec3::Z, DVec3::Z * 5.0]).is_none());
         // From behind the viewer to a point before it: the part that is seen is straight.
-        let [a, b] = in_picture(&camera, [DVec3::new(1.0, 0.0, 3.0), DVec3::new(1.0, 0.0, -4.0)]).unwrap();
+        let [a, b] =
+            in_picture(&camera, [DVec3::new(1.0, 0.0, 3.0), DVec3::new(1.0, 0.0, -4.0)]).unwrap();
         assert!((a.y - 50.0).abs() < 1e-9 && (b.y - 50.0).abs() < 1e-9 && a.x > b.x, "{a} {b}");
     }
 

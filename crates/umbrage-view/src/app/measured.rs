@@ -112,7 +112,8 @@ impl Judged {
         self.truth.as_ref().is_some_and(|truth| {
             let truth = truth.lock();
             let pixels = truth.sharp.len();
-            let is_read = |v: &Option<Visibility>| v.as_ref().is_none_or(|v| v.values.len() == pixels);
+            let is_read =
+                |v: &Option<Visibility>| v.as_ref().is_none_or(|v| v.values.len() == pixels);
             truth.is_done() && self.visibility[0].is_some() && self.visibility.iter().all(is_read)
         }) && !self.is_stale
     }
@@ -123,7 +124,8 @@ impl Judged {
         if truth.step == 0 {
             return None;
         }
-        let is_new = self.truth_texture.as_ref().is_none_or(|(_, version)| *version != self.version);
+        let is_new =
+            self.truth_texture.as_ref().is_none_or(|(_, version)| *version != self.version);
         if is_new {
             let [width, height] = truth.size;
             let colors = pixels(width, height)

@@ -14,7 +14,8 @@ mod windows;
 
 use crate::Outcome;
 use crate::action::Panel;
-use crate::settings::Settings;
+use crate::session::ToOpen;
+use crate::settings::{LightSetting, Settings};
 use crate::stage::{Frame, Job, News, Request, SceneInfo, SceneToOpen, SharedTruth, Stage};
 use egui::Ui;
 use measured::{History, Judged, Presets};
@@ -22,7 +23,6 @@ pub(crate) use script::Driver;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use textures::Textures;
-use umbrage_lab::{LightOptions, ViewOptions};
 use umbrage_render::Gpu;
 
 /// A message to the user.
@@ -41,8 +41,8 @@ pub(crate) struct Kept {
     pub(crate) driver: Option<Driver>,
     /// What the window's life came to.
     pub(crate) outcome: Outcome,
-    /// Whether the settings hold a view and a light that a scene must not replace.
-    pub(crate) keeps_view: bool,
+    /// What to open at the beginning.
+    pub(crate) to_open: Option<ToOpen>,
 }
 
 /// Which parts of the window are shown, and how.
@@ -86,7 +86,7 @@ pub(crate) struct App<'k> {
     history: History,
     presets: Presets,
     /// The scene that is being opened: its settings, the stage it is at, and since when.
-    opening: Option<(Settings, &'static str, Instant)>,
+    opening: Option<(ToOpen, &'static str, Instant)>,
     /// The long job that runs, with the share that is done.
     job: Option<(String, f32)>,
     /// The technique texts as they are being edited.
@@ -135,8 +135,9 @@ impl<'k> App<'k> {
             path,
         };
         app.apply_look(context);
-        let settings = app.kept.settings.clone();
-        app.open(settings);
+        if let Some(to_open) = app.kept.to_open.take() {
+            app.open(to_open);
+        }
         Ok(app)
     }
 
@@ -167,19 +168,16 @@ impl<'k> App<'k> {
         self.kept.message = Some(Message::new(text, true));
     }
 
-    /// Begins to open the scene of these settings, which become the window's once it is open.
-    fn open(&mut self, settings: Settings) {
-        let keeps_view = self.kept.keeps_view;
+    /// Begins to open a scene. The settings become the window's once it is open.
+    fn open(&mut self, to_open: ToOpen) {
         self.stage.open(SceneToOpen {
-            folder: settings.folder.clone(),
-            name: settings.scene.clone(),
-            changes: settings.changes.clone(),
-            opaque: settings.opaque,
-            view: ViewOptions { size: [960, 540], ..ViewOptions::default() },
-            light: LightOptions::default(),
+            name: to_open.settings.scene.clone(),
+            changes: to_open.settings.changes.clone(),
+            opaque: to_open.settings.opaque,
+            view: to_open.view.clone(),
+            light: to_open.light.clone(),
         });
-        let _ = keeps_view;
-        self.opening = Some((settings, "reading", Instant::now()));
+        self.opening = Some((to_open, "reading", Instant::now()));
     }
 
     fn begin(&mut self, what: &str, job: Job) {
@@ -223,16 +221,26 @@ impl<'k> App<'k> {
     }
 
     fn opened(&mut self, info: Arc<SceneInfo>) {
-        let Some((mut settings, ..)) = self.opening.take() else { return };
-        if !std::mem::take(&mut self.kept.keeps_view) {
+        let Some((ToOpen { mut settings, view, light: _, has_view }, ..)) = self.opening.take()
+        else {
+            return;
+        };
+        if !has_view {
+            let is_headlight = settings.light == LightSetting::Headlight;
             settings.begin_with(&info);
+            settings.near = view.near.or(settings.near);
+            settings.far = view.far.or(settings.far);
+            if is_headlight {
+                settings.light = LightSetting::Headlight;
+            }
         }
         self.path.clone_from(&settings.scene);
         self.drafts = [0, 1].map(|i| technique::Draft::new(&settings.techniques[i]));
         self.kept.settings = settings;
         let unsaid = info.notices.len();
         if unsaid > 0 {
-            let more = if unsaid > 1 { format!(" (and {} more)", unsaid - 1) } else { String::new() };
+            let more =
+                if unsaid > 1 { format!(" (and {} more)", unsaid - 1) } else { String::new() };
             self.say(format!("{}{more}", info.notices[0]));
         }
         self.info = Some(info);
@@ -295,9 +303,11 @@ impl<'k> App<'k> {
             self.kept.outcome = Outcome::DeviceLost;
             let words = problem.split_whitespace().collect::<Vec<_>>().join(" ");
             self.complain(format!("the GPU was lost ({words}) and has been opened again"));
-            if self.info.is_some() {
-                self.kept.keeps_view = true;
-            }
+            let settings = self.kept.settings.clone();
+            let has_view = self.info.is_some();
+            let again = ToOpen { has_view, ..ToOpen::scene(&settings.scene, &settings) };
+            let opening = self.opening.take().map(|(to_open, ..)| to_open);
+            self.kept.to_open = Some(opening.unwrap_or(ToOpen { settings, ..again }));
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         true

@@ -2,7 +2,7 @@
 
 use super::App;
 use super::controls::Tip;
-use super::lines::{lines, paint_in_world, paint_legend, paint_rows, BODY, VIEW};
+use super::lines::{BODY, VIEW, lines, paint_in_world, paint_legend, paint_rows};
 use crate::settings::{Compare, OverlayKind};
 use crate::stage::DrawnPicture;
 use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Stroke, TextureId, Ui, pos2, vec2};
@@ -25,8 +25,10 @@ impl App<'_> {
         egui::CentralPanel::default().frame(frame).show(ui, |ui| {
             let rect = ui.max_rect();
             let response = ui
-                .interact(rect, ui.id().with("picture"), Sense::click_and_drag())
-                .tip_beside("Drag to turn, right-drag to move, scroll to go nearer; F1 lists the keys.");
+                .interact(rect, ui.scope_id().with("picture"), Sense::click_and_drag())
+                .tip_beside(
+                    "Drag to turn, right-drag to move, scroll to go nearer; F1 lists the keys.",
+                );
             self.note_size(ui, rect);
             self.mouse(ui, &response, rect);
             let painter = ui.painter_at(rect);
@@ -37,7 +39,11 @@ impl App<'_> {
                     let (left, right) = rect.split_left_right_at_x(rect.left() + half);
                     self.one(&ui.painter_at(left), left, 0);
                     self.one(&ui.painter_at(right), right, 1);
-                    painter.vline(rect.left() + half, rect.y_range(), Stroke::new(1.0, Color32::BLACK));
+                    painter.vline(
+                        rect.left() + half,
+                        rect.y_range(),
+                        Stroke::new(1.0, Color32::BLACK),
+                    );
                 }
                 Compare::Wipe => {
                     let x = rect.left() + rect.width() * self.kept.shown.wipe;
@@ -134,15 +140,21 @@ impl App<'_> {
     /// What is going on, in the middle of the picture.
     fn state(&self, painter: &Painter, rect: Rect) {
         let text = match (&self.opening, &self.problem, &self.frame) {
-            (Some((settings, stage, since)), _, frame) => {
+            (Some((to_open, stage, since)), _, frame) => {
                 if frame.is_some() && since.elapsed().as_millis() < 200 {
                     return;
                 }
                 painter.ctx().request_repaint_after_secs(0.25);
-                format!("{}: {stage} ({:.0} s)", settings.scene, since.elapsed().as_secs_f64())
+                format!(
+                    "{}: {stage} ({:.0} s)",
+                    to_open.settings.scene,
+                    since.elapsed().as_secs_f64()
+                )
             }
             (None, Some(problem), _) => problem.clone(),
-            (None, None, None) if self.info.is_none() => "no scene; drop a .glb file here".to_owned(),
+            (None, None, None) if self.info.is_none() => {
+                "no scene; drop a .glb file here".to_owned()
+            }
             _ => return,
         };
         let font = FontId::proportional(16.0);
@@ -185,4 +197,3 @@ pub(super) fn share(rect: Rect, at: Pos2) -> [f32; 2] {
     let at = (at - rect.min) / rect.size();
     [at.x, at.y]
 }
-

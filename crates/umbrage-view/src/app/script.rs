@@ -253,7 +253,8 @@ impl App<'_> {
         let (Some(most), Some(before)) = (most_growth, before) else { return Done::Yes };
         let has_grown = |before: u64, now: u64, what: &str| {
             let limit = before as f64 * (1.0 + most);
-            (now as f64 > limit && before > 0).then(|| format!("{what} grew from {before} to {now}"))
+            (now as f64 > limit && before > 0)
+                .then(|| format!("{what} grew from {before} to {now}"))
         };
         let grown = [
             has_grown(before.resident, now.resident, "memory"),
@@ -272,9 +273,6 @@ impl App<'_> {
         let Some(driver) = &mut self.kept.driver else { return };
         driver.rest = driver.rest.saturating_sub(1);
         if let Some(events) = driver.events.pop_front() {
-            if let Some(Event::Key { modifiers, .. }) = events.first() {
-                input.modifiers = *modifiers;
-            }
             input.events.extend(events);
             if driver.events.is_empty() {
                 driver.rest = 3;

@@ -38,7 +38,7 @@ impl Draft {
     }
 
     fn text_field(&mut self, ui: &mut Ui) {
-        let id = ui.id().with("text");
+        let id = ui.scope_id().with("text");
         // While the list is open, these keys belong to it and not to the field.
         let mut step = 0;
         let mut is_accepted = false;
@@ -141,14 +141,18 @@ impl Draft {
         let shown = current.as_ref().map_or("one map".to_owned(), |w| w.word.to_string());
         ui.horizontal(|ui| {
             ui.label(name);
-            let meaning = current.as_ref().map_or("No maps for parts of the view.", |w| w.word.meaning);
+            let meaning =
+                current.as_ref().map_or("No maps for parts of the view.", |w| w.word.meaning);
             ComboBox::from_id_salt(name)
                 .selected_text(RichText::new(shown).monospace())
                 .width(120.0)
                 .show_ui(ui, |ui| {
                     let is_partition = matches!(slot, Slot::Slices | Slot::Faces);
                     if is_partition
-                        && ui.selectable_label(current.is_none(), "one map").tip("No such parts.").clicked()
+                        && ui
+                            .selectable_label(current.is_none(), "one map")
+                            .tip("No such parts.")
+                            .clicked()
                     {
                         self.try_change(with_word(&text, slot, None));
                     }

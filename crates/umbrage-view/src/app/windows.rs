@@ -3,9 +3,7 @@
 use super::App;
 use super::controls::{Tip, thousands};
 use super::input::KEYS;
-use super::lines::{
-    BODY, VIEW, lines, map_color, map_name, paint_from_light, paint_in_map,
-};
+use super::lines::{BODY, VIEW, lines, map_color, map_name, paint_from_light, paint_in_map};
 use super::measured::History;
 use super::picture::drawn;
 use crate::action::{Action, Panel};
@@ -14,7 +12,7 @@ use egui::{Color32, ComboBox, Grid, RichText, Sense, Stroke, Ui, Window, vec2};
 use egui_plot::{Legend, Line, Plot, PlotPoints, Points, VLine};
 use glam::DVec2;
 use umbrage::{Camera, Light, Plan};
-use umbrage_lab::{NamedTechnique, presets};
+use umbrage_lab::{NamedTechnique, PRESETS};
 
 /// Depths at which the theory panel computes errors.
 const DEPTHS: u32 = 128;
@@ -30,7 +28,7 @@ impl App<'_> {
             let most = context.content_rect().size() - vec2(24.0, 80.0);
             let width = f32::min(440.0, most.x.max(120.0));
             Window::new(title)
-                .id(egui::Id::new(title))
+                .id(egui::Id::unique(title))
                 .open(&mut is_open)
                 .default_width(width)
                 .max_width(most.x.max(120.0))
@@ -68,14 +66,24 @@ impl App<'_> {
             row("plan", "Time of planning on the CPU.", &|c| ms(Some(c.plan_ms)));
             row("depth", "Time to draw casters into the maps, on the GPU.", &|c| ms(c.depth_ms));
             row("filter", "Time to prefilter the maps, on the GPU.", &|c| ms(c.filter_ms));
-            row("picture", "Time to draw the picture with lookups, on the GPU.", &|c| ms(c.picture_ms));
+            row("picture", "Time to draw the picture with lookups, on the GPU.", &|c| {
+                ms(c.picture_ms)
+            });
             row("lookup", "What lookups add to the picture's time.", &|c| ms(c.lookup_ms));
             row("texels", "Texels of all maps.", &|c| thousands(c.texels));
-            row("memory", "What lookups read.", &|c| format!("{:.1} MiB", c.bytes as f64 / 1048576.0));
-            row("map draws", "Draw calls into maps, in a frame that drew them anew.", &|c| c.map_draws.to_string());
-            row("map triangles", "Triangles drawn into maps, likewise.", &|c| thousands(c.map_triangles));
+            row("memory", "What lookups read.", &|c| {
+                format!("{:.1} MiB", c.bytes as f64 / 1048576.0)
+            });
+            row("map draws", "Draw calls into maps, in a frame that drew them anew.", &|c| {
+                c.map_draws.to_string()
+            });
+            row("map triangles", "Triangles drawn into maps, likewise.", &|c| {
+                thousands(c.map_triangles)
+            });
             row("picture draws", "Draw calls of the picture.", &|c| c.picture_draws.to_string());
-            row("picture triangles", "Triangles of the picture.", &|c| thousands(c.picture_triangles));
+            row("picture triangles", "Triangles of the picture.", &|c| {
+                thousands(c.picture_triangles)
+            });
         });
     }
 
@@ -126,7 +134,10 @@ impl App<'_> {
             Grid::new("presets").striped(true).num_columns(6).show(ui, |ui| {
                 for (title, tip) in [
                     ("", ""),
-                    ("wrong", "Share of the pixels that are lit and should be dark, or the reverse."),
+                    (
+                        "wrong",
+                        "Share of the pixels that are lit and should be dark, or the reverse.",
+                    ),
                     ("mean error", "Mean difference of visibility to the truth."),
                     ("plan", "Time of planning on the CPU."),
                     ("frame", "What maps and lookups add to a frame that draws all maps."),
@@ -135,13 +146,13 @@ impl App<'_> {
                     ui.label(RichText::new(title).strong()).on_hover_text(tip);
                 }
                 ui.end_row();
-                for preset in presets() {
-                    let is_shown = self.kept.settings.techniques[0] == preset.technique;
-                    let tip = format!("{} {}", preset.meaning, preset.technique);
+                for preset in PRESETS {
+                    let is_shown = self.kept.settings.techniques[0] == preset.shadows;
+                    let tip = format!("{} {}", preset.meaning, preset.shadows);
                     if ui.selectable_label(is_shown, preset.name).tip(&tip).clicked() {
                         actions.push(Action::Preset(preset.name.to_owned()));
                     }
-                    match self.presets.of(preset.technique).map(|m| &m.result) {
+                    match self.presets.of(preset.shadows).map(|m| &m.result) {
                         None => {
                             ui.label("–");
                         }
@@ -149,8 +160,9 @@ impl App<'_> {
                             ui.label(problem);
                         }
                         Some(Ok(worth)) => {
-                            let percent =
-                                |v: Option<f64>| v.map_or("–".into(), |v| format!("{:.2}%", v * 100.0));
+                            let percent = |v: Option<f64>| {
+                                v.map_or("–".into(), |v| format!("{:.2}%", v * 100.0))
+                            };
                             ui.monospace(percent(worth.wrong_fraction));
                             ui.monospace(percent(worth.mean_abs_error));
                             ui.monospace(format!("{:.2} ms", worth.plan_ms));
@@ -171,8 +183,10 @@ impl App<'_> {
         let Some(drawn) = drawn(&frame, 0) else { return };
         let plan = &drawn.plan;
         let planned_for = frame.request.planned_for.unwrap_or(frame.request.camera);
-        ui.label("Texels along the middle line of sight, in pixels per texel: across (s) and along \
-                  (t) the warp's axis, and in the worst direction.");
+        ui.label(
+            "Texels along the middle line of sight, in pixels per texel: across (s) and along \
+                  (t) the warp's axis, and in the worst direction.",
+        );
         let curves = errors_along(plan, &planned_for);
         let mouse = self.mouse_depth.filter(|&depth| depth > 0.0);
         Plot::new("theory")
@@ -273,7 +287,9 @@ impl App<'_> {
         let camera = frame.request.planned_for.unwrap_or(frame.request.camera);
         let towards = match frame.light {
             Light::Directional { direction } => direction.normalize_or(glam::DVec3::NEG_Y),
-            _ => -frame.light.direction_to_light(camera.eye() + camera.forward() * camera.far() * 0.5),
+            _ => -frame
+                .light
+                .direction_to_light(camera.eye() + camera.forward() * camera.far() * 0.5),
         };
         let size = vec2(ui.available_width(), 300.0);
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
@@ -295,7 +311,7 @@ impl App<'_> {
     /// Begins to measure the presets in the present view.
     pub(super) fn measure_presets(&mut self) {
         let Some(frame) = &self.frame else { return };
-        let texts = presets().iter().map(|preset| preset.technique.parse());
+        let texts = PRESETS.iter().map(|preset| preset.shadows.parse());
         let techniques: Vec<NamedTechnique> = texts.flatten().collect();
         let (camera, light) = (frame.request.camera, frame.light);
         let light_size = self.kept.settings.light_size;

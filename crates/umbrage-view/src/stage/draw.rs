@@ -182,12 +182,13 @@ impl<'a> Artist<'a> {
         let plan = easel.plan(technique, planned_for, light, &bounds).map_err(|e| e.to_string())?;
         let plan_ms = milliseconds(start);
         let target = easel.targets.free(gpu, request.camera.image())?;
-        let (renderer, timer) = easel.renderer(gpu, buffers, technique, plan.fade.is_some())?;
+        let (renderer, mut timer) = easel.renderer(gpu, buffers, technique, plan.fade.is_some())?;
         let text = |e: umbrage_render::Error| e.to_string();
         renderer.leave_out(edge_on(&plan, tracer));
         let eye = request.camera.eye();
-        let maps =
-            renderer.draw_maps_seen_from(eye, &plan, Casters::Unmoved, timer).map_err(text)?;
+        let maps = renderer
+            .draw_maps_seen_from(eye, &plan, Casters::Unmoved, timer.as_deref_mut())
+            .map_err(text)?;
         let shading = Shading { camera: &request.camera, light, light_index: 0 };
         let picture = match request.overlay {
             None => renderer.frame(&shading, &target, timer),
@@ -230,7 +231,6 @@ impl<'a> Artist<'a> {
         let [width, height] = renderer.shadows().place(map)?.size;
         let most = width.max(height).div_ceil(MAP_SIDE);
         let target = easel.targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
-        renderer.map_picture(map, &target).ok()?;
         Some(target)
     }
 
@@ -252,7 +252,8 @@ impl<'a> Artist<'a> {
             .and_then(|_| renderer.frame(&shading, &target, Some(timer)));
         if drawn.is_ok() {
             finish(gpu);
-            bare.ms = timer.try_read(gpu).map(|times| times.picture_ms).or(bare.ms);
+            let times = timer.try_read(gpu).ok().flatten();
+            bare.ms = times.map(|times| times.picture_ms).or(bare.ms);
         }
     }
 
@@ -384,9 +385,9 @@ impl<'a> Easel<'a> {
     }
 
     fn read_times(&mut self, gpu: &Gpu) {
-        if let Some(times) = self.timer.as_mut().and_then(|timer| timer.try_read(gpu)) {
-            self.times = Some(times);
-        }
+        // What went wrong is found when the whole frame is checked.
+        let times = self.timer.as_mut().and_then(|timer| timer.try_read(gpu).ok().flatten());
+        self.times = times.or(self.times);
     }
 }
 

@@ -10,12 +10,10 @@ mod scene;
 mod truth;
 
 pub(crate) use errors::{Visibility, errors};
-pub(crate) use jobs::{Job, Measurement, Worth};
-pub(crate) use request::{
-    Costs, DrawnPicture, Frame, Overlay, Picture, Request, SceneInfo, Shining,
-};
+pub(crate) use jobs::{Job, Measurement};
+pub(crate) use request::{Costs, DrawnPicture, Frame, Overlay, Request, SceneInfo, Shining};
 pub(crate) use scene::SceneToOpen;
-pub(crate) use truth::{SharedTruth, TruthPicture};
+pub(crate) use truth::SharedTruth;
 
 use mailbox::Mailbox;
 use std::sync::Arc;
@@ -117,7 +115,7 @@ impl Stage {
         let threads = SceneThreads { number: self.scenes, requests: Arc::clone(&requests), jobs };
         self.coming = Some(threads);
         let (gpu, frames) = (self.gpu.clone(), Arc::clone(&self.frames));
-        let run = move || scene::run(&scene, gpu, &reporter, &requests, &jobs_to_do, &frames);
+        let run = move || scene::run(&scene, gpu, &reporter, &requests, jobs_to_do, &frames);
         let started = std::thread::Builder::new().name("scene".into()).spawn(run);
         if let Err(e) = started {
             self.coming = None;

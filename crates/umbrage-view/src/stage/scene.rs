@@ -6,7 +6,7 @@ use super::mailbox::{Mail, Mailbox};
 use super::request::{Request, SceneInfo};
 use super::truth::{TruthJob, trace_jobs};
 use super::{News, Reporter};
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::Receiver;
@@ -20,8 +20,6 @@ use umbrage_render::Gpu;
 /// A scene to open, and the view and light to begin with.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SceneToOpen {
-    /// The folder that a relative path begins in.
-    pub(crate) folder: PathBuf,
     /// A path, or the name of a built-in scene.
     pub(crate) name: String,
     pub(crate) changes: SceneOptions,
@@ -41,7 +39,7 @@ pub(super) fn run(
     gpu: Gpu,
     reporter: &Reporter,
     requests: &Mailbox<Request>,
-    jobs: &Receiver<Job>,
+    jobs: Receiver<Job>,
     frames: &AtomicU64,
 ) {
     if let Err(problem) = open_and_draw(scene, gpu, reporter, requests, jobs, frames) {
@@ -54,7 +52,7 @@ fn open_and_draw(
     gpu: Gpu,
     reporter: &Reporter,
     requests: &Mailbox<Request>,
-    jobs: &Receiver<Job>,
+    jobs: Receiver<Job>,
     frames: &AtomicU64,
 ) -> Result<(), String> {
     let stage = |name| match requests.is_pending() {
@@ -66,8 +64,8 @@ fn open_and_draw(
         }
     };
     stage("reading")?;
-    let SceneToOpen { folder, name, changes, opaque, view, light } = to_open;
-    let scene = open_scene(folder, name, changes).map_err(|e| e.to_string())?;
+    let SceneToOpen { name, changes, opaque, view, light } = to_open;
+    let scene = open_scene(Path::new(""), name, changes).map_err(|e| e.to_string())?;
     stage("preparing")?;
     let executors = Executors::with_gpu(gpu);
     let prepared = PreparedScene::new(&scene, &executors, *opaque, Fit::Surfaces)
@@ -97,7 +95,8 @@ fn open_and_draw(
     std::thread::scope(|scope| {
         let tracer = prepared.render().tracer();
         scope.spawn(|| trace_jobs(tracer, &truths, || reporter.tell(News::TruthGrew)));
-        scope.spawn(|| do_jobs(&prepared, jobs, requests, reporter));
+        let prepared = &prepared;
+        scope.spawn(move || do_jobs(prepared, &jobs, requests, reporter));
         let mut rests = true;
         loop {
             match requests.take((!rests).then_some(REST)) {

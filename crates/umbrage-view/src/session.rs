@@ -1,0 +1,159 @@
+//! Windows and session files.
+
+use crate::settings::{Compare, LightSetting, OverlayKind, Settings, TRUTH};
+use crate::stage::SceneInfo;
+use std::path::Path;
+use umbrage_lab::{LightOptions, Session, ViewOptions};
+use umbrage_scene::Lens;
+
+/// How a session's `compare` ends where the second picture is the truth.
+const WITH_TRUTH: &str = " with truth";
+
+/// What a window opens: its settings, and the view and the light to choose once the scene is there.
+#[derive(Clone, Debug)]
+pub(crate) struct ToOpen {
+    pub(crate) settings: Settings,
+    pub(crate) view: ViewOptions,
+    pub(crate) light: LightOptions,
+    /// Whether the settings have a view and a light already.
+    pub(crate) has_view: bool,
+}
+
+impl ToOpen {
+    /// A scene in its own view and light, with whatever else is set.
+    pub(crate) fn scene(name: &str, settings: &Settings) -> Self {
+        let settings = Settings {
+            scene: name.to_owned(),
+            changes: Default::default(),
+            opaque: false,
+            near: None,
+            far: None,
+            camera: None,
+            ..settings.clone()
+        };
+        let (view, light) = (ViewOptions::default(), LightOptions::default());
+        Self { settings, view, light, has_view: false }
+    }
+
+    /// A session that was read.
+    ///
+    /// # Errors
+    /// Names the word that this program does not know.
+    pub(crate) fn session(session: &Session, settings: &Settings) -> Result<Self, String> {
+        let compare = session.compare.as_deref().unwrap_or(Compare::ALL[0].1);
+        let (compare, with_truth) = match compare.strip_suffix(WITH_TRUTH) {
+            Some(compare) => (compare, true),
+            None => (compare, false),
+        };
+        let overlay = session.overlay.as_deref().unwrap_or(OverlayKind::ALL[0].1);
+        let mut techniques = settings.techniques.clone();
+        for (place, technique) in techniques.iter_mut().zip(&session.techniques) {
+            *place = technique.to_string();
+        }
+        if with_truth {
+            techniques[1] = TRUTH.to_owned();
+        }
+        let mut to_open = Self::scene(&session.scene, settings);
+        to_open.settings = Settings {
+            changes: session.changes.clone(),
+            opaque: session.opaque,
+            techniques,
+            compare: known("compare", compare, &Compare::ALL)?,
+            overlay: known("overlay", overlay, &OverlayKind::ALL)?,
+            fit: session.fit,
+            light_size: session.light_size,
+            ..to_open.settings
+        };
+        if session.headlight {
+            to_open.settings.light = LightSetting::Headlight;
+        }
+        to_open.view = session.view.clone();
+        to_open.light = session.light_options();
+        Ok(to_open)
+    }
+}
+
+/// The value of a word.
+fn known<T: Copy>(key: &str, word: &str, all: &[(T, &str, &str)]) -> Result<T, String> {
+    let found = all.iter().find(|(_, name, _)| *name == word);
+    found.map(|(value, ..)| *value).ok_or_else(|| {
+        let names: Vec<&str> = all.iter().map(|(_, name, _)| *name).collect();
+        format!("{key}: must be one of {}, is {word}", names.join(", "))
+    })
+}
+
+impl Settings {
+    /// The settings as a session, with pictures of this size.
+    ///
+    /// # Errors
+    /// Tells which value is not possible.
+    pub(crate) fn session(&self, info: &SceneInfo, size: [u32; 2]) -> Result<Session, String> {
+        let camera = self.camera(info, size).map_err(|e| e.to_string())?;
+        let (fov_deg, ortho) = match self.lens {
+            Lens::Perspective { fov_y_rad } => (Some(fov_y_rad.to_degrees()), None),
+            Lens::Orthographic { height } => (None, Some(height)),
+        };
+        let view = match (&self.camera, &self.light) {
+            // A headlight needs to know the view.
+            (Some(name), light) if *light != LightSetting::Headlight => {
+                ViewOptions { camera: Some(name.clone()), size, ..ViewOptions::default() }
+            }
+            _ => ViewOptions {
+                eye: Some(self.pose.eye),
+                target: Some(self.pose.target),
+                up: (self.pose.up != glam::DVec3::Y).then_some(self.pose.up),
+                fov_deg,
+                ortho,
+                near: Some(camera.near()).filter(|_| ortho.is_none()),
+                far: Some(camera.far()),
+                size,
+                camera: None,
+            },
+        };
+        let light = match &self.light {
+            LightSetting::Sun(_) | LightSetting::Hour(_) => {
+                LightOptions { sun: self.sun().map(|sun| sun.direction()), light: None }
+            }
+            LightSetting::Headlight => LightOptions::default(),
+            LightSetting::Named(name) => LightOptions { sun: None, light: Some(name.clone()) },
+        };
+        let with_truth = self.compares_with_truth();
+        let count = if self.compare.is_of_two() && !with_truth { 2 } else { 1 };
+        let techniques = self.techniques[..count].iter().map(|text| text.parse());
+        let compare =
+            Compare::ALL.iter().find(|(c, ..)| *c == self.compare).map(|(_, name, _)| *name);
+        let overlay = OverlayKind::ALL.iter().find(|(o, ..)| *o == self.overlay);
+        Ok(Session {
+            scene: self.scene.clone(),
+            changes: self.changes.clone(),
+            opaque: self.opaque,
+            animation: self.clip.and_then(|clip| Some(info.clips.get(clip)?.0.clone())),
+            time_s: self.clip.map(|_| self.time_s),
+            view,
+            light,
+            headlight: self.light == LightSetting::Headlight,
+            light_size: self.light_size,
+            techniques: techniques.collect::<Result<_, _>>().map_err(|e| format!("{e}"))?,
+            fit: self.fit,
+            overlay: overlay.map(|(_, name, _)| (*name).to_owned()),
+            compare: compare
+                .map(|name| format!("{name}{}", if with_truth { WITH_TRUTH } else { "" })),
+        })
+    }
+}
+
+/// What a path or name stands for.
+///
+/// # Errors
+/// The session cannot be read, or is wrong.
+pub(crate) fn to_open(path: &Path, settings: &Settings) -> Result<ToOpen, String> {
+    let is_session = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    match is_session {
+        true => {
+            let session = Session::read(path).map_err(|e| e.to_string())?;
+            ToOpen::session(&session, settings)
+                .map_err(|problem| format!("{}: {problem}", path.display()))
+        }
+        false => Ok(ToOpen::scene(&path.to_string_lossy(), settings)),
+    }
+}
