@@ -231,6 +231,7 @@ impl<'a> Artist<'a> {
         let [width, height] = renderer.shadows().place(map)?.size;
         let most = width.max(height).div_ceil(MAP_SIDE);
         let target = easel.targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
+        renderer.show_map(map, &target).ok()?;
         Some(target)
     }
 
