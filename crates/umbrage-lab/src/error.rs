@@ -35,6 +35,8 @@ pub enum Field {
     SunAngles,
     /// A light of the scene.
     Light,
+    /// Whether a sun shines from the viewer.
+    Headlight,
     /// A technique.
     Shadows,
     /// Largest error of the techniques whose text gives no size.
@@ -84,6 +86,7 @@ impl Field {
             Self::Sun => "sun",
             Self::SunAngles => "sun-angles",
             Self::Light => "light",
+            Self::Headlight => "headlight",
             Self::Shadows => "shadows",
             Self::MaxError => "max-error",
             Self::Samples => "samples",

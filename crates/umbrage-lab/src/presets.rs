@@ -32,7 +32,7 @@ pub const PRESETS: &[Preset] = &[
     Preset {
         name: "cheap",
         shadows: "adaptive@1024",
-        meaning: "One map of a million texels and one comparison a pixel: the least work.",
+        meaning: "One map of a million texels and one comparison a pixel, where every millisecond counts.",
     },
     Preset {
         name: "bevy",

@@ -90,15 +90,19 @@ impl Session {
         if self.techniques.is_empty() {
             return Err(Error::field(Field::Shadows, "must have at least one technique"));
         }
-        let refused = |problem: &str| Err(Error::field(Field::Session, problem));
-        if self.time_s.is_some_and(|t| !(0.0..=1e9).contains(&t)) {
-            return refused("time: must be a number of seconds, 0 to 1e9");
+        if !self.headlight {
+            return Ok(());
         }
-        if self.headlight && self.light != LightOptions::default() {
-            return refused("headlight: cannot be used with another light");
+        let other =
+            [(Field::Sun, self.light.sun.is_some()), (Field::Light, self.light.light.is_some())];
+        if let Some(&(by, _)) = other.iter().find(|(_, is_given)| *is_given) {
+            return Err(Error::Excluded { field: Field::Headlight, by });
         }
-        if self.headlight && (self.view.eye.is_none() || self.view.target.is_none()) {
-            return refused("headlight: needs eye and target, between which it shines");
+        if self.view.eye.is_none() || self.view.target.is_none() {
+            return Err(Error::field(
+                Field::Headlight,
+                "needs eye and target, between which it shines",
+            ));
         }
         Ok(())
     }
@@ -121,14 +125,12 @@ impl Session {
     /// Returns the command that compares the techniques with the truth, for a shell.
     pub fn compare_command(&self) -> String {
         // What is shown twice is compared once.
-        let mut techniques = self.techniques.clone();
-        let mut seen = Vec::new();
-        techniques.retain(|t| {
-            !seen.contains(t) && {
-                seen.push(t.clone());
-                true
+        let mut techniques: Vec<NamedTechnique> = Vec::new();
+        for technique in &self.techniques {
+            if !techniques.contains(technique) {
+                techniques.push(technique.clone());
             }
-        });
+        }
         self.command("compare", &techniques, self.light_size)
     }
 
@@ -207,7 +209,7 @@ impl Session {
             },
             opaque: keys.take("opaque")?.unwrap_or_default(),
             animation: keys.take("animation")?,
-            time_s: keys.take("time")?,
+            time_s: keys.take("time")?.map(read_seconds).transpose()?,
             view,
             light: LightOptions { sun: sun.map(vector).or(sun_angles), light: keys.take("light")? },
             headlight: keys.take("headlight")?.unwrap_or_default(),
@@ -216,7 +218,7 @@ impl Session {
                 .map(|t: String| read("light-size", &t))
                 .transpose()?,
             techniques: techniques.iter().map(|t| read("shadows", t)).collect::<Result<_, _>>()?,
-            fit: keys.take("fit")?.map(read_fit).transpose()?.unwrap_or_default(),
+            fit: keys.take("fit")?.map(|t: String| read_fit(&t)).transpose()?.unwrap_or_default(),
             overlay: keys.take("overlay")?,
             compare: keys.take("compare")?,
         };
@@ -231,7 +233,7 @@ impl Session {
         let vector = |v: Option<DVec3>| v.map(|v| json!(v.to_array()));
         let text = |t: &Option<String>| t.as_ref().map(|t| json!(t));
         let number = |n: Option<f64>| n.map(|n| json!(n));
-        let flag = |is_on: bool| is_on.then(|| json!(true));
+        let flag = |is_on: bool| is_on.then_some(Value::Bool(true));
         let Self { changes, view, light, .. } = self;
         let techniques: Vec<String> = self.techniques.iter().map(ToString::to_string).collect();
         let keys = [
@@ -281,7 +283,14 @@ fn read<T: FromStr<Err: std::error::Error>>(key: &str, text: &str) -> Result<T, 
     text.parse().map_err(|e: T::Err| format!("{key}: {text}: {}", with_causes(&e)))
 }
 
-fn read_fit(text: String) -> Result<Fit, String> {
+fn read_seconds(seconds: f64) -> Result<f64, String> {
+    match (0.0..=1e9).contains(&seconds) {
+        true => Ok(seconds),
+        false => Err(format!("time: must be a number of seconds, 0 to 1e9, is {seconds}")),
+    }
+}
+
+fn read_fit(text: &str) -> Result<Fit, String> {
     let all = [Fit::Box, Fit::Surfaces, Fit::Seen];
     let names = all.map(Fit::name).join(", ");
     let fit = all.into_iter().find(|fit| fit.name() == text);
@@ -440,7 +449,7 @@ mod tests {
             (r#""sun": [0, -1, 0], "sun-angles": [0, 45]"#, "sun-angles: cannot be used with sun"),
             (r#""sun-angles": [0, 91]"#, "sun-angles: must be an azimuth"),
             (r#""headlight": true"#, "headlight: needs eye and target"),
-            (r#""headlight": true, "light": "a""#, "headlight: cannot be used with another light"),
+            (r#""headlight": true, "light": "a""#, "headlight: cannot be used with light"),
             (r#""light-size": "2""#, "light-size: 2: must have a unit"),
             (r#""fit": "tight""#, "fit: must be one of box, surfaces, seen, is tight"),
             (r#""time": -1"#, "time: must be"),

@@ -52,7 +52,7 @@ pub(super) fn render_as(report: &Report, technique: &str) -> String {
     }
     match &report.light {
         LightInfo::Directional { name: None, direction } => {
-            add("sun", &comma_separated(*direction))
+            add("sun", &comma_separated(*direction));
         }
         LightInfo::Directional { name: Some(name), .. }
         | LightInfo::Spot { name: Some(name), .. }

@@ -66,6 +66,8 @@ struct Typing<'a> {
     typed: &'a str,
     /// Where what is being written ends, at the cursor or behind it.
     end: usize,
+    /// Whether the open parenthesis is closed behind the cursor.
+    is_closed: bool,
 }
 
 /// A word or option that may stand at the cursor, if it fits.
@@ -110,14 +112,16 @@ impl<'a> Typing<'a> {
                 _ => (slots, word, start) = (following, i + 1, i + 1),
             }
         }
+        let parenthesis = after.find(['(', ')']).map_or("", |i| &after[i..]);
+        let is_closed = open.is_some() && parenthesis.starts_with(')');
         let ends: &[char] = match open {
-            Some(_) if after.contains(')') => &[',', ')'],
+            Some(_) if is_closed => &[',', ')'],
             // Without its `)` the list of options goes on to the next word.
             Some(_) => &[',', '+', ':', '@'],
             None => &['(', '+', ':', '@'],
         };
         let end = cursor + after.find(ends).unwrap_or(after.len());
-        Self { text, cursor, slots, word, open, typed: &before[start..], end }
+        Self { text, cursor, slots, word, open, typed: &before[start..], end, is_closed }
     }
 
     /// The words or options that may stand in the place of what is being written.
@@ -179,7 +183,7 @@ impl<'a> Typing<'a> {
             "" if word.scales.is_empty() => 0,
             // The name of a size is that of its value.
             "" => word.example.len(),
-            _ => word.example.trim_start_matches(word.name).trim_start_matches('=').len(),
+            value => word.example.len() - word.name.len() - usize::from(value.starts_with('=')),
         };
         let text = format!("{before}{}", word.example);
         let selected = text.len() - value..text.len();
@@ -203,8 +207,7 @@ impl<'a> Typing<'a> {
         let Some(written) = self.slots.iter().find_map(|slot| slot.read(head).ok()) else {
             return Vec::new();
         };
-        let is_closed = self.open.is_some() && self.text[place.end..].contains(')');
-        let close = if is_closed { "" } else { ")" };
+        let close = if self.is_closed { "" } else { ")" };
         let change = |option: &str, value: usize| {
             let end = before.len() + option.len();
             let text = format!("{before}{option}{close}");

@@ -42,6 +42,7 @@ fn what_is_begun_is_completed() {
         ("tsm(|", &["tsm(focus=5)"]),
         ("tsm(fo|)", &["tsm(focus=5)"]),
         ("tsm(focus=|)+z2", &["tsm(focus=5)+z2"]),
+        ("tsm(fo|+z2(fitted)", &["tsm(focus=5)+z2(fitted)"]),
         ("adaptive+z3(a|", &["adaptive+z3(at=5/10)"]),
         ("adaptive+z3(fitted,|)", &["adaptive+z3(fitted,overlap=0.1)"]),
         ("adaptive:pcf3(po|", &["adaptive:pcf3(blur=2px,poisson)"]),
