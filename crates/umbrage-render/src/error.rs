@@ -27,6 +27,9 @@ pub enum Error {
         /// The limit that it exceeds.
         problem: String,
     },
+    /// A pose is that of another scene than the one that was uploaded.
+    #[error("the scene that was posed is not the one that was uploaded")]
+    OtherScene,
     /// An error of [`umbrage_wgpu`].
     #[error(transparent)]
     Shadows(#[from] umbrage_wgpu::Error),

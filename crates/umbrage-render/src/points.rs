@@ -71,7 +71,7 @@ impl Points {
     }
 }
 
-impl Renderer<'_, '_> {
+impl Renderer<'_> {
     /// Visibility, in [0, 1], of surface points under one of the plan's lights, as its maps have
     /// it. Each point is a position and the normal of its triangle, both in world space. The plan's
     /// maps must have been drawn.

@@ -2,6 +2,7 @@
 
 mod parity;
 mod pictures;
+mod poses;
 mod trouble;
 
 use std::path::Path;

@@ -10,7 +10,7 @@ use umbrage_wgpu::{Casters, ShadowOptions};
 use wgpu::{BufferUsages, MapMode, PollType};
 
 /// The sRGB colours of a frame.
-fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
+pub(crate) fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
     let (device, queue, texture) = (GPU.device(), GPU.queue(), target.color());
     let bytes_per_row = (4 * texture.width()).next_multiple_of(256);
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
