@@ -415,6 +415,22 @@ fn damage_is_told_or_left_out() {
     assert!(notices(&scene)[0].ends_with("its node has a matrix"));
 }
 
+/// What else animations may change is told of as an extension that is not read.
+#[test]
+fn channels_without_a_node_are_left_out() {
+    let mut file = turning("LINEAR");
+    let pointer = json!({"pointer": "/materials/0/alphaCutoff"});
+    let target = json!({"path": "pointer", "extensions": {"KHR_animation_pointer": pointer}});
+    let channels = file.json["animations"][0]["channels"].as_array_mut().unwrap();
+    channels.insert(0, json!({"sampler": 0, "target": target}));
+    let mut scene = file.set("/extensionsUsed", json!(["KHR_animation_pointer"])).load().unwrap();
+    let told =
+        "extensionsUsed: KHR_animation_pointer: not supported: what they describe is left out";
+    assert_eq!(notices(&scene), [told]);
+    scene.pose(Some(0), 3.0);
+    assert_near(corner(&scene, 0, 1), DVec3::Y);
+}
+
 /// Files damaged in any way load and can be posed at any time, or give an error.
 #[test]
 fn damaged_files_can_be_posed() {
