@@ -20,6 +20,7 @@ struct InfoJson {
     scene: String,
     cameras: Vec<CameraJson>,
     lights: Vec<LightJson>,
+    animations: Vec<AnimationJson>,
     /// Nodes that draw a mesh of their own, or of which a node below does.
     nodes: Vec<NodeJson>,
     /// Edge lengths of the box around the scene, metres.
@@ -50,6 +51,14 @@ struct LightJson {
     #[serde(flatten)]
     light: LightInfo,
     intensity: f32,
+}
+
+#[derive(Serialize)]
+struct AnimationJson {
+    /// The words that choose it, names first and its number last.
+    words: Vec<String>,
+    /// Time of its last key, seconds.
+    duration: f64,
 }
 
 #[derive(Serialize)]
@@ -92,6 +101,7 @@ impl InfoJson {
     fn of(scene: &Scene, view: &ChosenView, light: &ChosenLight) -> Self {
         let Aabb { min, max } = scene.bounds();
         let (cameras, lights) = (scene.camera_choices(), scene.light_choices());
+        let animations = scene.animation_choices();
         let notices = scene.all_notices().into_iter().map(|n| n.0);
         Self {
             scene: scene.name.clone(),
@@ -112,6 +122,16 @@ impl InfoJson {
                     words: lights.words(i),
                     light: ChosenLight { name: None, light: light.light }.info(),
                     intensity: light.intensity,
+                })
+                .collect(),
+            animations: scene
+                .animations
+                .clips()
+                .iter()
+                .enumerate()
+                .map(|(i, clip)| AnimationJson {
+                    words: animations.words(i),
+                    duration: clip.duration_s,
                 })
                 .collect(),
             nodes: nodes(scene, &scene.node_choices()),
@@ -179,6 +199,9 @@ fn text(info: &InfoJson, scene: &Scene, view: &ChosenView, light: &ChosenLight) 
         let light = ChosenLight { name: None, light: scene.lights[i].light };
         let dark = if of.intensity > 0.0 { "" } else { ", dark" };
         line("light", format!("{}: {}{dark}", words(&of.words), light_words(&light)));
+    }
+    for of in &info.animations {
+        line("animation", format!("{}: {} s", words(&of.words), six_digits(of.duration)));
     }
     for node in info.nodes.iter().take(MOST_NODES) {
         let of = format!("{} instances, {} triangles", node.instances, node.triangles);

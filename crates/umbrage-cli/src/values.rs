@@ -35,6 +35,11 @@ pub(crate) fn distance(text: &str) -> Result<f64> {
     values::metres(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
 }
 
+/// Parses a time in seconds, at least 0.
+pub(crate) fn seconds(text: &str) -> Result<f64> {
+    values::seconds(text.parse().unwrap_or(f64::NAN)).map_err(Error::msg)
+}
+
 /// Parses an error in pixels per texel, > 0 and at most 10¹².
 pub(crate) fn pixels_per_texel(text: &str) -> Result<f64> {
     match text.parse() {

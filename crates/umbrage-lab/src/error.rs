@@ -49,6 +49,10 @@ pub enum Field {
     Fit,
     /// Whether alpha-masked materials are treated as solid.
     Opaque,
+    /// The animation that poses the scene.
+    Animation,
+    /// Time in the animation.
+    Time,
     /// Nodes of the scene that are left out.
     Without,
     /// Whether ground is put under the scene.
@@ -93,6 +97,8 @@ impl Field {
             Self::LightSize => "light-size",
             Self::Fit => "fit",
             Self::Opaque => "opaque",
+            Self::Animation => "animation",
+            Self::Time => "time",
             Self::Without => "without",
             Self::Ground => "ground",
             Self::Backend => "backend",

@@ -15,7 +15,7 @@ use umbrage_wgpu::{Casters, LookupBuffers, SeenReadback, ShadowOptions};
 /// A scene that is ready to be rendered, by rays on the CPU and, if there is one, on a GPU.
 pub struct RenderScene<'a> {
     tracer: Tracer<'a>,
-    gpu: Option<(&'a Gpu, SceneBuffers<'a>)>,
+    gpu: Option<(&'a Gpu, SceneBuffers)>,
 }
 
 impl<'a> RenderScene<'a> {
@@ -62,7 +62,7 @@ impl<'a> RenderScene<'a> {
     }
 
     /// Returns the GPU and its buffers, if there is a GPU that can render the technique.
-    fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers<'a>)> {
+    fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers)> {
         self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
     }
 
@@ -146,7 +146,7 @@ pub(crate) enum Work<'a> {
 
 /// A GPU that renders a technique.
 pub(crate) struct OnGpu<'a> {
-    pub(crate) renderer: Renderer<'a, 'a>,
+    pub(crate) renderer: Renderer<'a>,
     pub(crate) gpu: &'a Gpu,
     /// Finds the triangles that the maps of a lamp leave out.
     tracer: &'a Tracer<'a>,

@@ -1,12 +1,18 @@
 //! Opens scenes, and finds cameras and lights by the words that choose them.
 
 use crate::error::{About, Error, Field};
+use crate::values;
 use std::path::{Path, PathBuf};
 use umbrage_scene::{Choices, LeftOut, Scene, SceneError, builtins};
 
 /// How a scene is changed once it is opened.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneOptions {
+    /// The animation that poses the scene: its name, or its number in the scene, such as `#2`.
+    /// `None` leaves the scene in the pose of its file.
+    pub animation: Option<String>,
+    /// Time in the animation, seconds, finite and at least 0. Times after its end are its end.
+    pub time_s: f64,
     /// Nodes that are left out, in the words `NAME`, `NAME:casting` or `NAME:receiving`. A name is
     /// that of a node, or its number in the scene, such as `#2`. It stands for all nodes of that
     /// name, with all nodes below them.
@@ -19,8 +25,18 @@ impl SceneOptions {
     /// Changes a scene.
     ///
     /// # Errors
-    /// An error if the scene has no such node, or if nothing is left of it.
+    /// An error if the scene has no such animation or node, or if nothing is left of it.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), Error> {
+        if let Some(word) = &self.animation {
+            let time_s = values::seconds(self.time_s)
+                .map_err(|problem| Error::field(Field::Time, problem))?;
+            let clip = find(Field::Animation, word, &scene.animation_choices())?;
+            scene.pose(Some(clip), time_s);
+            if scene.bounds().is_empty() {
+                let problem = format!("at {time_s} s of `{word}` there is nothing to see");
+                return Err(Error::field(Field::Time, problem));
+            }
+        }
         for text in &self.without {
             let (name, what) = match text.rsplit_once(':') {
                 Some((name, "casting")) => (name, LeftOut::Casting),
@@ -119,7 +135,7 @@ pub(crate) fn digest(folder: &Path, name: &str) -> Option<String> {
     Some(sha.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// Returns the index of the camera or light that a word chooses.
+/// Returns the index of the camera, light or animation that a word chooses.
 ///
 /// # Errors
 /// An error that lists the words that choose one.

@@ -144,6 +144,8 @@ fn begin(options: &SweepOptions) -> Result<Begun, Error> {
         samples: comparison.samples,
         light_size: comparison.light_size.map(|size| size.to_string()),
         opaque: options.opaque,
+        animation: options.scene.animation.clone(),
+        time_s: options.scene.animation.as_ref().map(|_| options.scene.time_s),
         without: options.scene.without.clone(),
         ground: options.scene.ground,
         fit: options.fit.name().into(),

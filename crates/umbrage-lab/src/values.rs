@@ -51,6 +51,18 @@ pub fn opening(degrees: f64) -> Result<f64, String> {
     }
 }
 
+/// Checks a time in an animation, seconds.
+///
+/// # Errors
+/// An error if the time is not finite or below 0.
+pub fn seconds(time: f64) -> Result<f64, String> {
+    if time.is_finite() && time >= 0.0 {
+        Ok(time)
+    } else {
+        Err("must be a number of seconds, at least 0, as in 1.5".to_owned())
+    }
+}
+
 /// Returns the direction in which the light of a sun travels, a unit vector, from where the sun
 /// stands: its azimuth, clockwise from north as seen from above, and its elevation above the
 /// horizon, degrees. North is −z and east is +x.

@@ -35,6 +35,12 @@ pub struct SweepSettings {
     pub light_size: Option<String>,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
+    /// The animation that poses the scenes; `None` if they have the poses of their files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub animation: Option<String>,
+    /// Time in the animation, seconds; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
     /// The nodes of the scenes that are left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
@@ -392,6 +398,8 @@ pub(crate) mod tests {
                 samples: 4,
                 light_size: None,
                 opaque: true,
+                animation: None,
+                time_s: None,
                 without: Vec::new(),
                 ground: false,
                 fit: "surfaces".to_owned(),

@@ -72,7 +72,7 @@ fn main() -> Result<(), Failure> {
 
 fn run(
     gpu: &Gpu,
-    buffers: &SceneBuffers<'_>,
+    buffers: &SceneBuffers,
     bounds: &Bounds<'_>,
     technique: &Technique,
     look: &SceneCamera,

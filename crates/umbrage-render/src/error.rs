@@ -35,6 +35,9 @@ pub enum Error {
         /// What it must be, and what it is.
         problem: String,
     },
+    /// A pose is that of another scene than the one that was uploaded.
+    #[error("the scene that was posed is not the one that was uploaded")]
+    OtherScene,
     /// An error of [`umbrage_wgpu`].
     #[error(transparent)]
     Shadows(#[from] umbrage_wgpu::Error),

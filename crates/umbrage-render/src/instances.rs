@@ -10,12 +10,12 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 /// Lists of instances to draw, one after the other.
 pub(crate) struct Instances {
-    /// All instances of the scene, in the order of [`SceneBuffers::instances`]. Maps and picture
+    /// All instances of the scene, in the order of [`Placed::instances`](crate::scene::Placed). Maps and picture
     /// copy from here those that they draw.
     all: Vec<CasterInstance>,
-    /// World position of the origin that `all` is relative to, metres; `None` before the first
-    /// frame.
-    origin: Option<DVec3>,
+    /// World position of the origin that `all` is relative to, metres, and the version of the
+    /// scene's instances; `None` before the first frame.
+    origin: Option<(DVec3, u64)>,
     list: Vec<CasterInstance>,
     draws: Vec<Draw>,
     /// The instances of a picture: how far away each is, and below that its index.
@@ -65,14 +65,16 @@ impl Instances {
     }
 
     /// Begins new lists, whose instances are relative to `origin` (world space, metres).
-    pub(crate) fn begin(&mut self, scene: &SceneBuffers<'_>, origin: DVec3) {
+    pub(crate) fn begin(&mut self, scene: &SceneBuffers, origin: DVec3) {
         self.list.clear();
         self.draws.clear();
-        if self.origin != Some(origin) {
+        let placed = scene.placed();
+        let now = Some((origin, placed.version));
+        if self.origin != now {
             self.all.clear();
             let at = |i: &Drawable| CasterInstance::new(&i.world_from_mesh, origin);
-            self.all.extend(scene.instances.iter().map(at));
-            self.origin = Some(origin);
+            self.all.extend(placed.instances.iter().map(at));
+            self.origin = now;
         }
     }
 
@@ -81,12 +83,12 @@ impl Instances {
     /// instance ascend.
     pub(crate) fn add_casters(
         &mut self,
-        scene: &SceneBuffers<'_>,
+        scene: &SceneBuffers,
         is_drawn: impl Fn(Aabb) -> bool,
         left_out: &(impl Iterator<Item = EdgeOn> + Clone),
     ) -> DrawList {
         let first_draw = self.draws.len();
-        for (i, instance) in scene.instances.iter().enumerate() {
+        for (i, instance) in scene.placed().instances.iter().enumerate() {
             if !(instance.role.casts && is_drawn(instance.bounds)) {
                 continue;
             }
@@ -106,12 +108,13 @@ impl Instances {
     /// a box counts, so that ground and walls follow what stands before them.
     pub(crate) fn add_nearest_first(
         &mut self,
-        scene: &SceneBuffers<'_>,
+        scene: &SceneBuffers,
         eye: DVec3,
         is_drawn: impl Fn(Aabb) -> bool,
     ) -> DrawList {
         self.order.clear();
-        for (i, instance) in scene.instances.iter().enumerate() {
+        let placed = scene.placed();
+        for (i, instance) in placed.instances.iter().enumerate() {
             if instance.role.is_seen && is_drawn(instance.bounds) {
                 let Aabb { min, max } = instance.bounds;
                 let squared = (min - eye).abs().max((max - eye).abs()).length_squared() as f32;
@@ -124,7 +127,7 @@ impl Instances {
         let first_draw = self.draws.len();
         for k in 0..self.order.len() {
             let i = self.order[k] as u32 as usize;
-            let mesh = scene.instances[i].mesh;
+            let mesh = placed.instances[i].mesh;
             self.push(first_draw, mesh, i, 0..scene.meshes[mesh].triangles());
         }
         first_draw..self.draws.len()

@@ -70,7 +70,7 @@ impl Points {
     }
 }
 
-impl Renderer<'_, '_> {
+impl Renderer<'_> {
     /// Visibility, in [0, 1], of surface points under one of the plan's lights, as its maps have
     /// it. Each point is a position and the normal of its triangle, both in world space. The maps
     /// must have been drawn: without any, all points are lit.

@@ -30,9 +30,9 @@ use wgpu::{
 use wgpu_profiler::GpuProfilerQuery;
 
 /// Draws one scene with one kind of shadow maps.
-pub struct Renderer<'g, 's> {
+pub struct Renderer<'g> {
     pub(crate) gpu: &'g Gpu,
-    scene: &'g SceneBuffers<'s>,
+    scene: &'g SceneBuffers,
     pub(crate) shadows: Shadows,
     pub(crate) points: Option<Points>,
     pub(crate) map_picture: Option<MapPicture>,
@@ -84,14 +84,14 @@ const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
     }],
 };
 
-impl<'g, 's> Renderer<'g, 's> {
+impl<'g> Renderer<'g> {
     /// Makes a renderer that looks up its shadow maps according to `options`.
     ///
     /// # Errors
     /// The device does not support the options.
     pub fn new(
         gpu: &'g Gpu,
-        scene: &'g SceneBuffers<'s>,
+        scene: &'g SceneBuffers,
         options: &ShadowOptions,
     ) -> Result<Self, Error> {
         Self::with_support(gpu, scene, options, gpu.support())
@@ -104,7 +104,7 @@ impl<'g, 's> Renderer<'g, 's> {
     /// As for [`new`](Self::new).
     pub fn with_support(
         gpu: &'g Gpu,
-        scene: &'g SceneBuffers<'s>,
+        scene: &'g SceneBuffers,
         options: &ShadowOptions,
         support: Support,
     ) -> Result<Self, Error> {
@@ -119,7 +119,7 @@ impl<'g, 's> Renderer<'g, 's> {
     /// As for [`new`](Self::new).
     pub fn with_lookup(
         gpu: &'g Gpu,
-        scene: &'g SceneBuffers<'s>,
+        scene: &'g SceneBuffers,
         options: &ShadowOptions,
         support: Support,
         change: impl FnOnce(String) -> String,
@@ -474,7 +474,7 @@ pub(crate) struct Pipelines {
 
 /// Draws meshes into a pass. The vertex buffers are set once.
 struct Drawer<'a, 'p, 'e> {
-    scene: &'a SceneBuffers<'a>,
+    scene: &'a SceneBuffers,
     pass: &'p mut RenderPass<'e>,
     drawn: &'p mut Drawn,
     /// Whether the pipeline for meshes with holes was set last.
@@ -485,7 +485,7 @@ struct Drawer<'a, 'p, 'e> {
 
 impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
     fn new(
-        scene: &'a SceneBuffers<'a>,
+        scene: &'a SceneBuffers,
         instances: &Instances,
         pass: &'p mut RenderPass<'e>,
         drawn: &'p mut Drawn,

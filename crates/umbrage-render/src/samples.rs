@@ -40,7 +40,7 @@ pub(crate) const SAMPLE_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Largest width and height of a tile, samples: each of its three layers takes up to 16 MiB.
 const TILE: u32 = 1024;
 
-impl Renderer<'_, '_> {
+impl Renderer<'_> {
     /// Samples of some of a picture's rows, row by row and pixel by pixel from the left. Each pixel
     /// has a regular grid of `grid` × `grid` samples, also row by row. The maps must have been
     /// drawn. Maps, texels and errors are only computed if `wants_texels` is true.
@@ -140,7 +140,7 @@ impl Layers {
 
     fn draw(
         &self,
-        renderer: &mut Renderer<'_, '_>,
+        renderer: &mut Renderer<'_>,
         shading: &Shading<'_>,
         tile: &Tile,
         picture: &Pipelines,

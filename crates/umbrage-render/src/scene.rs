@@ -2,8 +2,9 @@ use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use umbrage::{Aabb, Camera};
-use umbrage_scene::{Alpha, Instance, Material, Mesh, Role, Sampling, Scene, Texture, Wrap};
+use umbrage_scene::{Alpha, Instance, Material, Mesh, Moved, Role, Sampling, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
     AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
@@ -14,9 +15,9 @@ use wgpu::{
     VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode,
 };
 
-/// The meshes and materials of a scene on a GPU.
-pub struct SceneBuffers<'a> {
-    scene: &'a Scene,
+/// The meshes and materials of a scene on a GPU, in the pose that it had when it was uploaded or that
+/// was [set](Self::pose) last.
+pub struct SceneBuffers {
     pub(crate) positions: Buffer,
     pub(crate) attributes: Buffer,
     /// Layout of `attributes`, of which the first is all that masked casters need.
@@ -26,9 +27,21 @@ pub struct SceneBuffers<'a> {
     pub(crate) meshes: Vec<MeshRange>,
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) material_layout: BindGroupLayout,
+    /// Renderers share the buffers, so that a new pose reaches all of them.
+    placed: RwLock<Placed>,
+}
+
+/// Where the instances of a scene are.
+pub(crate) struct Placed {
     /// The instances that have triangles, those of one mesh next to each other.
     pub(crate) instances: Vec<Drawable>,
-    /// A box around all instances.
+    /// How often instances changed.
+    pub(crate) version: u64,
+    /// For each of the scene's instances, its index in `instances`, if it has triangles.
+    drawable_of: Vec<Option<u32>>,
+    /// A box around each mesh, in its own space, metres.
+    mesh_boxes: Vec<Aabb>,
+    /// A box around all instances that are seen, world space, metres.
     bounds: Aabb,
 }
 
@@ -49,6 +62,7 @@ pub(crate) struct Drawable {
 pub(crate) struct MeshRange {
     pub(crate) indices: std::ops::Range<u32>,
     pub(crate) first_vertex: i32,
+    pub(crate) vertices: usize,
     pub(crate) material: usize,
 }
 
@@ -105,12 +119,12 @@ struct MaterialUniform {
     padding: [f32; 3],
 }
 
-impl<'a> SceneBuffers<'a> {
+impl SceneBuffers {
     /// Uploads a scene. If `opaque` is true, alpha masks are ignored.
     ///
     /// # Errors
     /// The scene or a texture is too large for the device.
-    pub fn new(gpu: &Gpu, scene: &'a Scene, opaque: bool) -> Result<Self, Error> {
+    pub fn new(gpu: &Gpu, scene: &Scene, opaque: bool) -> Result<Self, Error> {
         let device = gpu.device();
         let limits = device.limits();
         let largest = limits.max_buffer_size.min(u64::from(u32::MAX));
@@ -151,6 +165,7 @@ impl<'a> SceneBuffers<'a> {
             let range = MeshRange {
                 indices: first_index..end,
                 first_vertex,
+                vertices: mesh.positions.len(),
                 material: materials.index(mesh.material, !mesh.uvs.is_empty()),
             };
             first_vertex += mesh.positions.len() as i32;
@@ -158,18 +173,7 @@ impl<'a> SceneBuffers<'a> {
             range
         });
         let meshes: Vec<MeshRange> = meshes.collect();
-        let boxes = scene.instance_boxes();
-        let drawable =
-            scene.instances.iter().zip(boxes).enumerate().map(|(i, (placed, bounds))| {
-                let Instance { mesh, world_from_mesh } = *placed;
-                let role = scene.roles.of(i);
-                Drawable { instance: i, mesh, world_from_mesh, bounds, role }
-            });
-        let mut instances: Vec<Drawable> = drawable.filter(|i| !i.bounds.is_empty()).collect();
-        instances.sort_by_key(|i| i.mesh);
-        let bounds = instances.iter().fold(Aabb::EMPTY, |all, i| all.union(i.bounds));
         let buffers = Self {
-            scene,
             positions: gpu.buffer(
                 "positions",
                 bytemuck::cast_slice(&all_positions),
@@ -185,27 +189,65 @@ impl<'a> SceneBuffers<'a> {
             meshes,
             materials: materials.list,
             material_layout,
-            instances,
-            bounds,
+            placed: RwLock::new(Placed::new(scene)),
         };
         gpu.check()?;
         Ok(buffers)
     }
 
-    /// The scene that was uploaded.
-    pub fn scene(&self) -> &'a Scene {
-        self.scene
+    /// Moves instances and deforms meshes as `moved` tells of the scene that was uploaded, which
+    /// has been [posed](Scene::pose) since. What is drawn from now on shows the new pose. Returns
+    /// boxes around the casters that changed, before and after, world space, metres: pass them to
+    /// the next [`Renderer::draw_maps`](crate::Renderer::draw_maps) as
+    /// [`Casters::MovedIn`](umbrage_wgpu::Casters::MovedIn), of each renderer. The boxes of several
+    /// poses between two draws count together.
+    ///
+    /// # Errors
+    /// The scene is not the one that was uploaded, or the device refused something.
+    pub fn pose(&self, gpu: &Gpu, scene: &Scene, moved: &Moved) -> Result<Vec<Aabb>, Error> {
+        let mut placed = self.placed.write().unwrap_or_else(PoisonError::into_inner);
+        let is_same = scene.meshes.len() == self.meshes.len()
+            && scene.instances.len() == placed.drawable_of.len()
+            && moved.instances.iter().all(|&i| i < scene.instances.len());
+        let of_mesh = |&i: &usize| {
+            let (mesh, range) = (scene.meshes.get(i)?, self.meshes.get(i)?);
+            (mesh.positions.len() == range.vertices).then_some((i, mesh, range))
+        };
+        let deformed: Option<Vec<_>> = moved.meshes.iter().map(of_mesh).collect();
+        let Some(deformed) = deformed.filter(|_| is_same) else { return Err(Error::OtherScene) };
+        let stride = self.attribute_layout.array_stride;
+        let mut attributes = Vec::new();
+        for (i, mesh, range) in deformed {
+            let first = range.first_vertex as u64;
+            let positions = bytemuck::cast_slice(&mesh.positions);
+            gpu.queue().write_buffer(&self.positions, first * size_of::<Vec3>() as u64, positions);
+            attributes.clear();
+            push_attributes(mesh, stride == WITH_ALPHA.array_stride, &mut attributes);
+            let contents = bytemuck::cast_slice(&attributes);
+            gpu.queue().write_buffer(&self.attributes, first * stride, contents);
+            placed.mesh_boxes[i] = mesh.bounds();
+        }
+        let casters = placed.move_instances(scene, &moved.instances);
+        gpu.check()?;
+        Ok(casters)
     }
 
-    /// Whether a mesh has holes where its material's alpha is low.
+    /// Where the instances are.
+    pub(crate) fn placed(&self) -> RwLockReadGuard<'_, Placed> {
+        // A thread that panicked left every instance whole.
+        self.placed.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// A distance along the view beyond which nothing lies, past the near plane, metres.
     pub(crate) fn farthest(&self, camera: &Camera) -> f64 {
-        let corners = self.instances.first().map(|_| self.bounds.corners());
+        let bounds = self.placed().bounds;
+        let corners = (!bounds.is_empty()).then(|| bounds.corners());
         let depths = corners.into_iter().flatten().map(|corner| camera.depth(corner));
         let farthest = depths.fold(camera.far(), f64::max);
         farthest + 0.01 * (farthest - camera.near())
     }
 
+    /// Whether a mesh has holes where its material's alpha is low.
     pub(crate) fn is_masked(&self, mesh: usize) -> bool {
         self.materials[self.meshes[mesh].material].mask.is_some()
     }
@@ -213,6 +255,58 @@ impl<'a> SceneBuffers<'a> {
     /// Memory of vertices and indices, bytes.
     pub fn bytes(&self) -> u64 {
         self.positions.size() + self.attributes.size() + self.indices.size()
+    }
+}
+
+impl Placed {
+    fn new(scene: &Scene) -> Self {
+        let mesh_boxes: Vec<Aabb> = scene.meshes.iter().map(Mesh::bounds).collect();
+        let drawable = |i: usize| Drawable::new(scene, i, &mesh_boxes);
+        let mut instances: Vec<Drawable> = (0..scene.instances.len()).map(drawable).collect();
+        instances.retain(|i| !i.bounds.is_empty());
+        instances.sort_by_key(|i| i.mesh);
+        let mut drawable_of = vec![None; scene.instances.len()];
+        for (k, drawable) in (0..).zip(&instances) {
+            drawable_of[drawable.instance] = Some(k);
+        }
+        let mut placed =
+            Self { instances, version: 0, drawable_of, mesh_boxes, bounds: Aabb::EMPTY };
+        placed.find_bounds();
+        placed
+    }
+
+    /// Moves these instances to where the scene has them. Returns boxes around those that cast,
+    /// before and after.
+    fn move_instances(&mut self, scene: &Scene, moved: &[usize]) -> Vec<Aabb> {
+        let mut casters = Vec::new();
+        for &i in moved {
+            let Some(k) = self.drawable_of[i] else { continue };
+            let new = Drawable::new(scene, i, &self.mesh_boxes);
+            let old = std::mem::replace(&mut self.instances[k as usize], new);
+            let new = &self.instances[k as usize];
+            let casting = [&old, new].into_iter().filter(|drawable| drawable.role.casts);
+            casters.extend(casting.map(|drawable| drawable.bounds));
+        }
+        if !moved.is_empty() {
+            self.version += 1;
+            self.find_bounds();
+        }
+        casters
+    }
+
+    fn find_bounds(&mut self) {
+        let seen = self.instances.iter().filter(|i| i.role.is_seen);
+        self.bounds = seen.fold(Aabb::EMPTY, |all, i| all.union(i.bounds));
+    }
+}
+
+impl Drawable {
+    fn new(scene: &Scene, instance: usize, mesh_boxes: &[Aabb]) -> Self {
+        let Instance { mesh, world_from_mesh } = scene.instances[instance];
+        let corners = mesh_boxes[mesh].corners().map(|p| world_from_mesh.transform_point3(p));
+        let bounds = if mesh_boxes[mesh].is_empty() { Aabb::EMPTY } else { Aabb::around(corners) };
+        let role = scene.roles.of(instance);
+        Self { instance, mesh, world_from_mesh, bounds, role }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The nodes of a scene's file, the words that choose nodes, cameras and lights, and what nodes do.
 
 use crate::types::{Notice, Scene};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
 /// A node of a scene's file.
@@ -44,22 +44,38 @@ impl Role {
     }
 }
 
-/// The roles of instances, of which most have the default one.
+/// The roles of instances, of which most have the default one. An instance that the present
+/// [pose](Scene::pose) flattens is absent: it is neither seen nor casts, whatever else its role.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Roles {
-    /// In the order of the instances; those beyond the end have the default role.
+    /// In the order of the instances, as if none were absent; those beyond the end have the default
+    /// role.
     first: Vec<Role>,
+    absent: BTreeSet<usize>,
 }
 
 impl Roles {
     /// The role of the instance with this index.
     pub fn of(&self, instance: usize) -> Role {
-        self.first.get(instance).copied().unwrap_or_default()
+        let role = self.first.get(instance).copied().unwrap_or_default();
+        match self.absent.contains(&instance) {
+            true => Role { is_seen: false, casts: false, ..role },
+            false => role,
+        }
     }
 
     /// Whether every instance has the default role.
     pub fn are_default(&self) -> bool {
-        self.first.iter().all(|&r| r == Role::default())
+        self.absent.is_empty() && self.first.iter().all(|&r| r == Role::default())
+    }
+
+    /// Sets whether an instance is absent.
+    pub(crate) fn set_absent(&mut self, instance: usize, is_absent: bool) {
+        if is_absent {
+            self.absent.insert(instance);
+        } else {
+            self.absent.remove(&instance);
+        }
     }
 
     /// Changes the roles of some instances.
@@ -178,6 +194,13 @@ impl Scene {
             }
         }
         Choices::new(names)
+    }
+
+    /// The words that choose the scene's animations: the indices are those of
+    /// [`Animations::clips`](crate::Animations::clips).
+    pub fn animation_choices(&self) -> Choices<'_> {
+        let clips = self.animations.clips().iter();
+        Choices::new(clips.map(|clip| ["", clip.name.as_str()]).collect())
     }
 
     /// The words that choose the scene's nodes.

@@ -1,3 +1,4 @@
+use crate::animation::Animations;
 use crate::nodes::{Role, Roles, SceneNode};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
@@ -28,6 +29,8 @@ pub struct Scene {
     /// Index into [`Scene::nodes`] of the node that surrounds all else as a sky does, if there is
     /// one and it is seen or casts.
     pub sky: Option<usize>,
+    /// The clips of the file, by which [`Scene::pose`] moves the scene.
+    pub animations: Animations,
 }
 
 /// Triangles of one material, in their own space.
@@ -54,7 +57,8 @@ pub struct Mesh {
 pub struct Instance {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// Transform from mesh space to world space; finite and invertible.
+    /// Transform from mesh space to world space; finite and invertible. Of no other meaning if the
+    /// instance is absent in the present pose (see [`Roles`]).
     pub world_from_mesh: DAffine3,
 }
 
@@ -269,6 +273,12 @@ impl Mesh {
             + size_of_val(&*self.uvs)
             + size_of_val(&*self.alphas)
             + size_of_val(&*self.triangles)
+    }
+
+    /// The largest magnitude of a coordinate, metres.
+    pub(crate) fn reach(&self) -> f64 {
+        let farthest = self.positions.iter().fold(Vec3::ZERO, |all, p| all.max(p.abs()));
+        f64::from(farthest.max_element())
     }
 
     /// The box around the corners of the triangles, mesh space, metres.

@@ -444,11 +444,11 @@ fn what_is_not_read_is_told_once_a_kind() {
             "extensionsUsed: KHR_materials_clearcoat, KHR_materials_unlit: not supported: surfaces \
              are drawn without what they describe",
             "extensionsUsed: MSFT_lod, EXT_made_up: not supported: what they describe is left out",
-            "animations[0] and 2 more: not played, nodes stay in the pose they have",
             "cameras[0]: aspectRatio is not used, the picture's size decides",
             "scenes[1] and 1 more: left out, only the default scene is shown",
             "nodes[2]: has a matrix beside translation, rotation or scale, the matrix counts",
             "nodes[1].rotation: is no unit quaternion, its direction counts",
+            "animations[0] and 2 more: nothing of it can be played, left out",
             "materials[0]: baseColorFactor is not within 0 and 1, the nearest colour instead",
             "materials[0]: textures other than that of the base colour are not drawn",
             "materials[0]: the light that it emits is not drawn",

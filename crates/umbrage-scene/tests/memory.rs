@@ -140,6 +140,48 @@ fn files_and_json_are_counted() {
     assert!(scene.notices[0].0.contains("bytes of data"), "{:?}", scene.notices);
 }
 
+#[test]
+fn animations_are_counted() {
+    let _alone = alone();
+    let animated = |channels: usize| {
+        let mut file = File::triangle();
+        let times = file.push(
+            "accessors",
+            json!({"componentType": 5126, "type": "SCALAR", "count": 10_000, "sparse": {
+                "count": 1, "indices": {"bufferView": 3, "componentType": 5123},
+                "values": {"bufferView": 0}
+            }}),
+        );
+        let values = out_of_nothing(&mut file, 10_000);
+        let channel = json!({"sampler": 0, "target": {"node": 0, "path": "scale"}});
+        let animation = json!({
+            "samplers": [{"input": times, "output": values}], "channels": vec![channel; channels]
+        });
+        file.push("animations", animation);
+        file
+    };
+    assert!(too_large(animated(300), 16 * MIB).contains("animations[0].channels["));
+    let scene = animated(1).load_within(16 * MIB).unwrap();
+    assert_eq!(scene.animations.clips().len(), 1, "one alone fits");
+
+    // So is what the targets of many nodes keep.
+    let mut file = File::triangle();
+    let positions = out_of_nothing(&mut file, 3000);
+    let target = json!({"POSITION": positions});
+    *file.primitive() = json!({
+        "attributes": {"POSITION": positions, "NORMAL": positions}, "targets": vec![target; 20]
+    });
+    let times = file.floats("SCALAR", &[0.0]);
+    let weights = file.floats("SCALAR", &[0.0; 20]);
+    let nodes: Vec<usize> = (0..40).map(|_| file.push("nodes", json!({"mesh": 0}))).collect();
+    let channel = |node| json!({"sampler": 0, "target": {"node": node, "path": "weights"}});
+    let channels: Vec<_> = nodes.iter().map(channel).collect();
+    let samplers = json!([{"input": times, "output": weights}]);
+    file.push("animations", json!({"samplers": samplers, "channels": channels}));
+    file.json["scenes"][0]["nodes"] = json!(nodes);
+    assert!(too_large(file, 16 * MIB).contains("meshes[0].primitives[0]"));
+}
+
 /// A square image with every channel in use.
 fn image(side: u32, has_alpha: bool) -> Vec<u8> {
     let pixel = |x: u32, y: u32| [(x % 251) as u8, (y % 241) as u8, (x * y % 239) as u8, x as u8];
@@ -187,6 +229,15 @@ fn load_mutated(rounds: usize) -> usize {
     let mut morphed = File::triangle();
     let steps = morphed.floats("VEC3", &[0.5; 9]);
     morphed.primitive()["targets"] = json!([{"POSITION": steps}]);
+    let mut moved = skinned();
+    let steps = moved.floats("VEC3", &[0.5; 9]);
+    moved.primitive()["targets"] = json!([{"POSITION": steps, "NORMAL": steps}]);
+    let times = moved.floats("SCALAR", &[0.0, 1.0]);
+    let scales = moved.floats("VEC3", &[1.0; 6]);
+    let samplers = json!([{"input": times, "output": scales}, {"input": times, "output": times}]);
+    let channel = |k, node, path| json!({"sampler": k, "target": {"node": node, "path": path}});
+    let channels = json!([channel(0, 2, "scale"), channel(1, 0, "weights")]);
+    moved.push("animations", json!({"samplers": samplers, "channels": channels}));
     let mut sparse = copies(300);
     let positions = out_of_nothing(&mut sparse, 600);
     sparse.primitive()["attributes"] = json!({"POSITION": positions, "COLOR_0": positions});
@@ -197,6 +248,7 @@ fn load_mutated(rounds: usize) -> usize {
         instanced(),
         skinned(),
         morphed.set("/nodes/0/weights", json!([1.0])),
+        moved,
         sparse,
     ];
     let files = files.map(File::glb);

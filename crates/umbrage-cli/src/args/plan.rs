@@ -84,9 +84,13 @@ impl Plan {
         {
             ensure!(!is_given, "{option} names something of a scene, but no SCENE is given");
         }
-        let SceneChangeArgs { opaque, without, ground } = &self.changes;
-        let changes =
-            [("--opaque", *opaque), ("--without", !without.is_empty()), ("--ground", *ground)];
+        let SceneChangeArgs { opaque, animation, time: _, without, ground } = &self.changes;
+        let changes = [
+            ("--opaque", *opaque),
+            ("--animation", animation.is_some()),
+            ("--without", !without.is_empty()),
+            ("--ground", *ground),
+        ];
         for (option, is_given) in changes {
             ensure!(!is_given, "{option} changes a scene, but no SCENE is given");
         }

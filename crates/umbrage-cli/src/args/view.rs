@@ -26,6 +26,15 @@ pub(crate) struct SceneChangeArgs {
     /// Alpha-masked materials cast and show as solid.
     #[arg(long)]
     pub(crate) opaque: bool,
+    /// Pose the scene by an animation, by name or number (`umbrage info` lists them).
+    #[arg(long, value_name = "NAME")]
+    pub(crate) animation: Option<String>,
+    /// Time in the animation, seconds.
+    #[arg(
+        long, value_name = "SECONDS", value_parser = values::seconds, allow_hyphen_values = true,
+        default_value = "0", requires = "animation"
+    )]
+    pub(crate) time: f64,
     /// Leave nodes out, with all below them, by name or number (`umbrage info` lists them); once
     /// for each. NAME:casting casts no shadow but is seen, NAME:receiving casts but is not seen.
     #[arg(long, value_name = "NAME")]
@@ -38,7 +47,8 @@ pub(crate) struct SceneChangeArgs {
 impl SceneChangeArgs {
     /// How the scene is changed when it is opened.
     pub(crate) fn options(&self) -> SceneOptions {
-        SceneOptions { without: self.without.clone(), ground: self.ground }
+        let Self { animation, time, without, ground, .. } = self.clone();
+        SceneOptions { animation, time_s: time, without, ground }
     }
 
     /// Adds the changes of a session.

@@ -224,6 +224,8 @@ pub(super) fn check_same(
             (Field::LightSize, s.light_size.clone().unwrap_or_else(|| "off".to_owned())),
             (Field::Fit, s.fit.clone()),
             (Field::Opaque, on(s.opaque)),
+            (Field::Animation, s.animation.clone().unwrap_or_else(|| "off".to_owned())),
+            (Field::Time, s.time_s.map_or("off".to_owned(), |time| time.to_string())),
             (Field::Without, s.without.join(" ")),
             (Field::Ground, on(s.ground)),
             (Field::Backend, s.backend.clone()),

@@ -405,6 +405,8 @@ fn a_sweeps_page_leads_to_its_views() {
             light_size: None,
             fit: "box".to_owned(),
             opaque: true,
+            animation: Some(nasty.to_owned()),
+            time_s: Some(1.5),
             without: vec![nasty.to_owned()],
             ground: true,
             backend: "reference".to_owned(),

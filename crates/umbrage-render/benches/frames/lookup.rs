@@ -14,10 +14,10 @@ const BIAS: f64 = 2e-3;
 
 /// Makes a renderer that looks the only map of a plan up in this way, and draws the map. `None` for
 /// filters whose fetches depend on the point, and for plans with several maps.
-pub(crate) fn bare_renderer<'a, 's>(
-    set: &'a Set<'s>,
+pub(crate) fn bare_renderer<'a>(
+    set: &'a Set<'_>,
     plan: &Plan,
-) -> Result<Option<Renderer<'a, 's>>, Failure> {
+) -> Result<Option<Renderer<'a>>, Failure> {
     let (Some(filter), 1) = (filter_text(plan.filter), plan.maps.len()) else { return Ok(None) };
     // The same plan gets the same place in every new texture.
     let mut drawn = set.renderer(plan.filter)?;

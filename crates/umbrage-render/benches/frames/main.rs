@@ -109,7 +109,7 @@ impl Args {
 struct Set<'a> {
     gpu: &'a Gpu,
     case: &'a Case,
-    buffers: SceneBuffers<'a>,
+    buffers: SceneBuffers,
     camera: Camera,
     all: umbrage::Aabb,
     boxes: umbrage::BoxTree,
@@ -156,7 +156,7 @@ impl<'a> Set<'a> {
         Ok(planner.plan(&self.camera, &[self.case.light], &bounds, technique)?)
     }
 
-    fn renderer(&self, filter: Filter) -> Result<Renderer<'_, 'a>, Failure> {
+    fn renderer(&self, filter: Filter) -> Result<Renderer<'_>, Failure> {
         let options = ShadowOptions { filter, ..ShadowOptions::default() };
         Ok(Renderer::new(self.gpu, &self.buffers, &options)?)
     }
@@ -178,7 +178,7 @@ impl<'a> Set<'a> {
         &self,
         planner: &mut Planner,
         technique: &Technique,
-        renderer: &mut Renderer<'_, '_>,
+        renderer: &mut Renderer<'_>,
     ) -> Result<Times, Failure> {
         let start = Instant::now();
         let plan = self.planned(planner, technique)?;
@@ -197,7 +197,7 @@ impl<'a> Set<'a> {
     }
 
     /// Draws the picture, and returns the time that it takes.
-    fn picture(&self, renderer: &mut Renderer<'_, '_>) -> Result<f64, Failure> {
+    fn picture(&self, renderer: &mut Renderer<'_>) -> Result<f64, Failure> {
         let shading = Shading { camera: &self.camera, light: &self.case.light, light_index: 0 };
         let start = Instant::now();
         renderer.frame(&shading, &self.target, self.timer.borrow_mut().as_mut())?;

@@ -3,6 +3,7 @@
 mod overlays;
 mod parity;
 mod pictures;
+mod poses;
 mod trouble;
 mod window;
 

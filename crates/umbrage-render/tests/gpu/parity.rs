@@ -150,7 +150,7 @@ fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
 }
 
 /// Compares one technique in a scene's default light.
-fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
+pub(crate) fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     let light = set.light();
     let plan = set.plan(&[light], technique);
     let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };

@@ -9,7 +9,7 @@ use umbrage_trace::shade;
 use umbrage_wgpu::{Casters, ShadowOptions};
 
 /// The sRGB colours of a frame.
-fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
+pub(crate) fn read(target: &FrameTarget) -> Vec<[u8; 3]> {
     target.read(&GPU).unwrap().into_iter().map(|[r, g, b, _]| [r, g, b]).collect()
 }
 

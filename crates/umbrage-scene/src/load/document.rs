@@ -2,7 +2,7 @@ use super::budget::Budget;
 use super::{extensions, uri};
 use crate::error::SceneError;
 use crate::types::Notice;
-use gltf::json::{Index, Node, Root, root::Get};
+use gltf::json::{Index, Node, Root, Value, deserialize, root::Get};
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::fs::Metadata;
@@ -76,8 +76,17 @@ impl<'a> Document<'a> {
         let objects = json.iter().filter(|&&b| b == b'{').count() as u64;
         budget.take("JSON", objects, "objects", size_of::<Node>())?;
         budget.take("JSON", json.len() as u64, "characters", 1)?;
-        let root: Root = gltf::json::deserialize::from_slice(json)
-            .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
+        let root: Root = match deserialize::from_slice(json) {
+            Err(_) if has_pointers(json) => {
+                let taken = budget.taken();
+                budget.take("JSON", json.len() as u64, "characters", size_of::<Value>())?;
+                let root = without_pointers(json);
+                budget.give_back_to(taken);
+                root
+            }
+            root => root,
+        }
+        .map_err(|e| fail("JSON", format!("is not glTF 2.0: {e}")))?;
         let buffers = Vec::new();
         let mut document = Self { path, root, budget, has_byte_order_mark, buffers };
         document.check_asset()?;
@@ -217,6 +226,25 @@ listed!(
     gltf::json::Texture: "textures",
     gltf::json::texture::Sampler: "samplers",
 );
+
+/// Whether a file may have animations that change other things than nodes. Their channels have no
+/// node, which the schema's types refuse.
+fn has_pointers(json: &[u8]) -> bool {
+    let name = b"KHR_animation_pointer";
+    json.windows(name.len()).any(|found| found == name)
+}
+
+/// Parses JSON without the channels of animations that have no node.
+fn without_pointers(json: &[u8]) -> Result<Root, gltf::json::Error> {
+    let mut root: Value = deserialize::from_slice(json)?;
+    let animations = root.get_mut("animations").and_then(Value::as_array_mut);
+    for animation in animations.into_iter().flatten() {
+        if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+            channels.retain(|channel| channel["target"].get("node").is_some());
+        }
+    }
+    deserialize::from_value(root)
+}
 
 /// The content of a regular file, for what is at `place` in the scene file.
 pub(super) fn read_file(

@@ -1,11 +1,8 @@
 use super::document::{Document, Notices};
+use crate::animation::{LARGEST, Local};
 use crate::error::SceneError;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Index;
-
-/// Largest magnitude of an entry of a transform. Larger entries count as overflow, although
-/// products with positions overflow only much later.
-pub(super) const LARGEST: f64 = 1e100;
 
 /// Largest distance of a matrix's last row from 0, 0, 0, 1. Exporters that multiply matrices in
 /// single precision leave such dust.
@@ -20,6 +17,8 @@ pub(super) struct Hierarchy {
     pub(super) is_hidden: Vec<bool>,
     /// Indices of the nodes in the shown scene, each once, with parents before their children.
     pub(super) shown: Vec<usize>,
+    /// Indices of all nodes, with parents before their children.
+    pub(super) order: Vec<usize>,
     /// The parent of each node, indexed by node.
     pub(super) parent: Vec<Option<usize>>,
 }
@@ -48,13 +47,13 @@ impl Hierarchy {
         }
         let mut world_from_node = vec![DAffine3::IDENTITY; nodes.len()];
         let mut is_hidden = vec![false; nodes.len()];
-        let mut reached = 0;
+        let mut order = Vec::with_capacity(nodes.len());
         let roots = || (0..nodes.len()).filter(|&i| parent[i].is_none());
         let mut open: Vec<usize> = roots().collect();
         while let Some(i) = open.pop() {
-            reached += 1;
+            order.push(i);
             let above = parent[i].map_or(DAffine3::IDENTITY, |p| world_from_node[p]);
-            let world = above * local(document, i, notices)?;
+            let world = above * local(document, i, notices)?.affine();
             if world.to_cols_array().iter().any(|c| !c.is_finite() || c.abs() > LARGEST) {
                 return Err(document.invalid(&format!("nodes[{i}]"), "its transform overflows"));
             }
@@ -62,7 +61,7 @@ impl Hierarchy {
             is_hidden[i] = hides_itself(document, i)? || parent[i].is_some_and(|p| is_hidden[p]);
             open.extend(children(i));
         }
-        if reached < nodes.len() {
+        if order.len() < nodes.len() {
             return Err(document.invalid("nodes", "some are among their own ancestors"));
         }
 
@@ -88,7 +87,7 @@ impl Hierarchy {
                 open[first..].reverse();
             }
         }
-        Ok(Self { world_from_node, is_hidden, shown, parent })
+        Ok(Self { world_from_node, is_hidden, shown, order, parent })
     }
 }
 
@@ -126,7 +125,15 @@ pub(super) fn affine(
     Ok(DAffine3::from_mat4(m))
 }
 
-fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine3, SceneError> {
+/// A node's transform in its parent's space.
+///
+/// # Errors
+/// It is not finite, or its rotation is none.
+pub(super) fn local(
+    document: &Document,
+    i: usize,
+    notices: &mut Notices,
+) -> Result<Local, SceneError> {
     let node = &document.root.nodes[i];
     let fail =
         |field: &str, problem: &str| Err(document.invalid(&format!("nodes[{i}].{field}"), problem));
@@ -135,7 +142,8 @@ fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine
             let told = "has a matrix beside translation, rotation or scale, the matrix counts";
             notices.add(format!("nodes[{i}]"), told);
         }
-        return affine(document, m, &format!("nodes[{i}].matrix"), notices);
+        let matrix = affine(document, m, &format!("nodes[{i}].matrix"), notices)?;
+        return Ok(Local::Matrix(matrix));
     }
     let vector =
         |v: Option<[f32; 3]>, default| v.map_or(default, |v| DVec3::from(v.map(f64::from)));
@@ -155,5 +163,5 @@ fn local(document: &Document, i: usize, notices: &mut Notices) -> Result<DAffine
         let place = format!("nodes[{i}].rotation");
         notices.add(place, "is no unit quaternion, its direction counts");
     }
-    Ok(DAffine3::from_scale_rotation_translation(scale, rotation.normalize(), translation))
+    Ok(Local::Parts { translation, rotation: rotation.normalize(), scale })
 }

@@ -1,10 +1,12 @@
 use super::document::{Document, Notices};
 use super::material::TexCoords;
+use crate::animation::{Influences, Target, displace};
 use crate::error::SceneError;
+use crate::normals;
 use crate::types::Mesh;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use gltf::json::accessor::Type;
-use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index};
 
@@ -17,27 +19,20 @@ pub(super) struct Wanted<'a> {
     pub(super) is_masked: bool,
     /// Weights of the morph targets; those that are missing count as 0.
     pub(super) morph_weights: &'a [f32],
+    /// Whether morph targets are kept, because their weights change. The mesh is then not morphed.
+    pub(super) keeps_targets: bool,
     pub(super) is_skinned: bool,
 }
 
-/// The triangles of a primitive, and the joints that move them.
+/// The triangles of a primitive, and what deforms them.
 pub(super) struct Loaded {
     pub(super) mesh: Mesh,
     /// One for each of the sets `JOINTS_0`, `JOINTS_1`, …; empty if the mesh is not skinned.
     pub(super) influences: Vec<Influences>,
-}
-
-/// For each vertex, four of the joints that move it, and their weights.
-pub(super) struct Influences {
-    joints: Vec<[u32; 4]>,
-    weights: Vec<[f32; 4]>,
-}
-
-impl Influences {
-    /// The joints that move a vertex, with their weights.
-    pub(super) fn of_vertex(&self, i: usize) -> impl Iterator<Item = (u32, f32)> {
-        self.joints[i].into_iter().zip(self.weights[i]).filter(|(_, weight)| *weight != 0.0)
-    }
+    /// The morph targets that are kept.
+    pub(super) targets: Vec<Target>,
+    /// Whether each triangle has corners of its own, with its own normal.
+    pub(super) is_flat: bool,
 }
 
 fn attribute(primitive: &Primitive, semantic: Semantic) -> Option<Index<Accessor>> {
@@ -76,7 +71,9 @@ pub(super) fn load(
     note_unread(primitive, place, wanted, notices);
     check_counts(document, primitive, place, wanted, positions)?;
     let mut positions = vectors(document, positions, &format!("{place}.attributes.POSITION"))?;
-    morph(document, primitive, place, wanted, Moved::Positions, &mut positions)?;
+    if !wanted.keeps_targets {
+        morph(document, primitive, place, wanted, Moved::Positions, &mut positions)?;
+    }
     let triangles = load_triangles(document, primitive, mode, place, &positions, notices)?;
     if triangles.is_empty() {
         notices.add(place, "has no triangles, left out");
@@ -90,9 +87,13 @@ pub(super) fn load(
         Some(id) => vectors(document, id, &format!("{place}.attributes.NORMAL"))?,
         None => Vec::new(),
     };
-    if !normals.is_empty() {
+    if !(normals.is_empty() || wanted.keeps_targets) {
         morph(document, primitive, place, wanted, Moved::Normals, &mut normals)?;
     }
+    let targets = match wanted.keeps_targets {
+        true => load_targets(document, primitive, place, positions.len(), !normals.is_empty())?,
+        false => Vec::new(),
+    };
     let uvs = match wanted.tex_coords {
         Some(coords) => load_uvs(document, primitive, place, coords, notices)?,
         None => Vec::new(),
@@ -107,16 +108,18 @@ pub(super) fn load(
     document.budget.take(place, count, "vertices", size_of::<u32>() + size_of::<usize>())?;
     let material = wanted.material;
     let mesh = Mesh { positions, normals, uvs, alphas, triangles, material };
-    let mut loaded = Loaded { mesh, influences };
+    let is_flat = mesh.normals.is_empty();
+    let mut loaded = Loaded { mesh, influences, targets, is_flat };
     drop_unused_vertices(&mut loaded, place, notices);
     let mesh = &mut loaded.mesh;
-    if mesh.normals.is_empty() {
+    if is_flat {
         notices.add(place, "has no normals, shaded flat");
         let corners = 3 * mesh.triangles.len() as u64;
-        document.budget.take(place, corners, "corners", BYTES_PER_CORNER)?;
+        let bytes = BYTES_PER_CORNER + loaded.targets.len() * size_of::<Vec3>();
+        document.budget.take(place, corners, "corners", bytes)?;
         shade_flat(&mut loaded);
     } else {
-        let repaired = repair_normals(mesh);
+        let repaired = normals::repair(mesh);
         notices.add_some(
             place,
             repaired,
@@ -242,25 +245,51 @@ fn morph(
 ) -> Result<(), SceneError> {
     let targets = primitive.targets.iter().flatten().zip(wanted.morph_weights).enumerate();
     for (k, (target, &weight)) in targets.filter(|(_, (_, weight))| **weight != 0.0) {
-        let (id, name) = match moved {
-            Moved::Positions => (target.positions, "POSITION"),
-            Moved::Normals => (target.normals, "NORMAL"),
-        };
-        let Some(id) = id else { continue };
-        let place = format!("{place}.targets[{k}].{name}");
-        let (n, found) = (values.len(), document.get(id, &place)?.count.0);
-        if found != n as u64 {
-            let problem = format!("has {found} elements for {n} vertices");
-            return Err(document.invalid(&place, problem));
-        }
         let taken = document.budget.taken();
-        let steps = vectors(document, id, &place)?;
-        for (value, step) in values.iter_mut().zip(steps) {
-            *value = (value.as_dvec3() + step.as_dvec3() * f64::from(weight)).as_vec3();
-        }
+        let steps = load_steps(document, target, place, k, moved, values.len())?;
+        displace(values, &steps, weight);
         document.budget.give_back_to(taken);
     }
     Ok(())
+}
+
+/// The displacements of morph target `k`, one for each of `vertices`; none if it moves nothing.
+fn load_steps(
+    document: &Document,
+    target: &MorphTarget,
+    place: &str,
+    k: usize,
+    moved: Moved,
+    vertices: usize,
+) -> Result<Vec<Vec3>, SceneError> {
+    let (id, name) = match moved {
+        Moved::Positions => (target.positions, "POSITION"),
+        Moved::Normals => (target.normals, "NORMAL"),
+    };
+    let Some(id) = id else { return Ok(Vec::new()) };
+    let place = format!("{place}.targets[{k}].{name}");
+    let found = document.get(id, &place)?.count.0;
+    if found != vertices as u64 {
+        let problem = format!("has {found} elements for {vertices} vertices");
+        return Err(document.invalid(&place, problem));
+    }
+    vectors(document, id, &place)
+}
+
+/// All morph targets of a primitive.
+fn load_targets(
+    document: &Document,
+    primitive: &Primitive,
+    place: &str,
+    vertices: usize,
+    has_normals: bool,
+) -> Result<Vec<Target>, SceneError> {
+    let target = |(k, target)| {
+        let steps = |moved| load_steps(document, target, place, k, moved, vertices);
+        let normals = if has_normals { steps(Moved::Normals)? } else { Vec::new() };
+        Ok(Target { positions: steps(Moved::Positions)?, normals })
+    };
+    primitive.targets.iter().flatten().enumerate().map(target).collect()
 }
 
 /// Texture coordinates of a primitive, transformed for its material; empty if it has none.
@@ -363,28 +392,17 @@ fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
-/// The triangle's normal with twice its area as length, in double precision so that it is zero only
-/// for triangles without area.
-fn area_normal(positions: &[Vec3], triangle: [u32; 3]) -> DVec3 {
-    let [a, b, c] = triangle.map(|i| positions[i as usize].as_dvec3());
-    (b - a).cross(c - a)
-}
-
 /// Gives every triangle corners of its own, which have the triangle's normal.
 fn shade_flat(loaded: &mut Loaded) {
-    let mesh = &loaded.mesh;
-    let normals = mesh.triangles.iter().flat_map(|&t| {
-        let n = area_normal(&mesh.positions, t).normalize_or(DVec3::Y);
-        [n.as_vec3(); 3]
-    });
-    let normals = normals.collect();
-    let corners: Vec<usize> = mesh.triangles.iter().flatten().map(|&i| i as usize).collect();
+    let corners = loaded.mesh.triangles.iter().flatten().map(|&i| i as usize);
+    let corners: Vec<usize> = corners.collect();
     loaded.take_vertices(&corners);
     let mesh = &mut loaded.mesh;
-    mesh.normals = normals;
     for (k, t) in mesh.triangles.iter_mut().enumerate() {
         *t = [0, 1, 2].map(|c| 3 * k as u32 + c);
     }
+    mesh.normals = vec![Vec3::ZERO; corners.len()];
+    normals::flatten(mesh);
 }
 
 /// Removes the vertices that no triangle uses, because files may let all primitives share one large
@@ -419,7 +437,7 @@ impl Loaded {
     /// Replaces the vertices by those with the given indices, in that order. The triangles' indices
     /// are left alone.
     fn take_vertices(&mut self, indices: &[usize]) {
-        let Self { mesh, influences } = self;
+        let Self { mesh, influences, targets, .. } = self;
         take(&mut mesh.positions, indices);
         take(&mut mesh.normals, indices);
         take(&mut mesh.uvs, indices);
@@ -427,6 +445,10 @@ impl Loaded {
         for set in influences {
             take(&mut set.joints, indices);
             take(&mut set.weights, indices);
+        }
+        for target in targets {
+            take(&mut target.positions, indices);
+            take(&mut target.normals, indices);
         }
     }
 }
@@ -436,30 +458,4 @@ fn take<T: Copy>(values: &mut Vec<T>, indices: &[usize]) {
     if !values.is_empty() {
         *values = indices.iter().map(|&i| values[i]).collect();
     }
-}
-
-/// Makes all normals unit vectors. Returns how many of them had no direction and were computed from
-/// the triangles.
-fn repair_normals(mesh: &mut Mesh) -> usize {
-    let mut missing = vec![false; mesh.normals.len()];
-    for (normal, missing) in mesh.normals.iter_mut().zip(&mut missing) {
-        match normal.as_dvec3().try_normalize() {
-            Some(n) => *normal = n.as_vec3(),
-            None => *missing = true,
-        }
-    }
-    let count = missing.iter().filter(|&&m| m).count();
-    if count > 0 {
-        let mut sums = vec![DVec3::ZERO; missing.len()];
-        for &t in &mesh.triangles {
-            let normal = area_normal(&mesh.positions, t);
-            for i in t {
-                sums[i as usize] += normal;
-            }
-        }
-        for (i, _) in missing.iter().enumerate().filter(|(_, m)| **m) {
-            mesh.normals[i] = sums[i].normalize_or(DVec3::Y).as_vec3();
-        }
-    }
-    count
 }

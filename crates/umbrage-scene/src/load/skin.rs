@@ -1,18 +1,18 @@
 use super::document::{Document, Notices};
-use super::hierarchy::{self, Hierarchy};
-use super::primitive::Influences;
+use super::hierarchy;
+use super::rigging::Rigging;
+use crate::animation::{Influences, Joint};
 use crate::error::SceneError;
-use crate::types::Mesh;
-use glam::{DAffine3, DMat3, DVec3, Mat4};
+use glam::Mat4;
 use gltf::json::{Index, Skin};
 
-/// For each joint, the transform from its bind space to the world, in the pose that the nodes have.
-pub(super) fn joint_matrices(
+/// The joints of a skin.
+pub(super) fn joints(
     document: &Document,
     skin: Index<Skin>,
-    hierarchy: &Hierarchy,
+    rigging: &Rigging<'_>,
     notices: &mut Notices,
-) -> Result<Vec<DAffine3>, SceneError> {
+) -> Result<Vec<Joint>, SceneError> {
     let place = format!("skins[{}]", skin.value());
     let json = document.get(skin, &place)?;
     let inverse_binds = match json.inverse_bind_matrices {
@@ -25,70 +25,51 @@ pub(super) fn joint_matrices(
             document.invalid(&place, format!("has {m} inverse bind matrices for {j} joints"))
         );
     }
-    document.budget.take(&place, json.joints.len() as u64, "joints", size_of::<DAffine3>())?;
+    document.budget.take(&place, json.joints.len() as u64, "joints", size_of::<Joint>())?;
     let joint = |(joint, inverse_bind): (&Index<_>, [f32; 16])| {
-        let world = hierarchy.world_from_node.get(joint.value()).ok_or_else(|| {
+        let anchor = rigging.anchor(joint.value()).ok_or_else(|| {
             document.invalid(&place, format!("there is no nodes[{}]", joint.value()))
         })?;
         let place = format!("{place}.inverseBindMatrices");
-        Ok(*world * hierarchy::affine(document, inverse_bind, &place, notices)?)
+        let inverse_bind = hierarchy::affine(document, inverse_bind, &place, notices)?;
+        Ok(Joint { anchor, inverse_bind })
     };
     json.joints.iter().zip(inverse_binds).map(joint).collect()
 }
 
-/// Deforms a mesh to the pose of its joints. The returned translation takes the mesh's new space to
-/// the world. The new space has its origin at a joint, so that single precision keeps the shape of
-/// meshes far from the world's origin.
-pub(super) fn pose(
+/// Checks the influences of `vertices` by a skin of `joints` joints.
+///
+/// # Errors
+/// A joint does not exist, or weights are not finite.
+pub(super) fn check(
     document: &Document,
-    mesh: &mut Mesh,
     influences: &[Influences],
-    joints: &[DAffine3],
+    vertices: usize,
+    joints: usize,
     place: &str,
     notices: &mut Notices,
-) -> Result<DAffine3, SceneError> {
-    let origin = joints.first().map_or(DVec3::ZERO, |j| j.translation);
+) -> Result<(), SceneError> {
     let (mut unbound, mut scaled) = (0, 0);
-    for i in 0..mesh.positions.len() {
-        let mut blend = DAffine3::from_mat3_translation(DMat3::ZERO, DVec3::ZERO);
+    for i in 0..vertices {
         let mut sum = 0.0;
-        for (index, weight) in influences.iter().flat_map(|set| set.of_vertex(i)) {
-            let joint = joints.get(index as usize).ok_or_else(|| {
-                let problem = format!("a vertex uses joint {index}, the skin has {}", joints.len());
-                document.invalid(place, problem)
-            })?;
-            let weight = f64::from(weight);
-            blend.matrix3 += joint.matrix3 * weight;
-            blend.translation += joint.translation * weight;
-            sum += weight;
+        for (joint, weight) in influences.iter().flat_map(|set| set.of_vertex(i)) {
+            if joint as usize >= joints {
+                let problem = format!("a vertex uses joint {joint}, the skin has {joints}");
+                return Err(document.invalid(place, problem));
+            }
+            sum += f64::from(weight);
         }
         if !sum.is_finite() {
             return Err(document.invalid(place, "the weights of a vertex are not finite"));
         }
         if sum.abs() < 1e-6 {
             unbound += 1;
-            blend = joints.first().copied().unwrap_or(DAffine3::IDENTITY);
-            sum = 1.0;
+        } else {
+            // Weights of 8 bits add up to 1 but for some 255ths.
+            scaled += usize::from((sum - 1.0).abs() > 0.05);
         }
-        // Weights of 8 bits add up to 1 but for some 255ths.
-        scaled += usize::from((sum - 1.0).abs() > 0.05);
-        let position = blend.transform_point3(mesh.positions[i].as_dvec3()) / sum;
-        mesh.positions[i] = (position - origin).as_vec3();
-        if !mesh.positions[i].is_finite() {
-            return Err(document.invalid(place, "the pose moves a vertex out of range"));
-        }
-        // Normals transform by the cofactor matrix. Where the pose flattens the surface, the old
-        // normal is kept, because no direction is better than another.
-        let m = blend.matrix3;
-        let cofactor = DMat3::from_cols(
-            m.y_axis.cross(m.z_axis),
-            m.z_axis.cross(m.x_axis),
-            m.x_axis.cross(m.y_axis),
-        ) * m.determinant().signum();
-        let normal = mesh.normals[i].as_dvec3();
-        mesh.normals[i] = (cofactor * normal).normalize_or(normal).as_vec3();
     }
     notices.add_some(place, scaled, "vertices have joint weights that do not sum to 1, scaled");
     notices.add_some(place, unbound, "vertices have no joint weights, moved with the first joint");
-    Ok(DAffine3::from_translation(origin))
+    Ok(())
 }
