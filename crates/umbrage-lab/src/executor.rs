@@ -38,7 +38,7 @@ impl<'a> RenderScene<'a> {
     }
 
     /// Returns the GPU and the scene's buffers on it, if there is a GPU.
-    pub fn on_gpu(&self) -> Option<(&'a Gpu, &SceneBuffers<'a>)> {
+    pub fn on_gpu(&self) -> Option<(&'a Gpu, &SceneBuffers)> {
         self.gpu.as_ref().map(|(gpu, buffers)| (*gpu, buffers))
     }
 
@@ -96,7 +96,7 @@ impl<'a> RenderScene<'a> {
 /// Finds on a GPU what cameras see, for maps that are fitted to that.
 pub struct Scout<'a> {
     gpu: &'a Gpu,
-    renderer: Renderer<'a, 'a>,
+    renderer: Renderer<'a>,
     target: Option<FrameTarget>,
     readback: SeenReadback,
 }
@@ -106,7 +106,7 @@ impl<'a> Scout<'a> {
     ///
     /// # Errors
     /// An error if the GPU has no compute shaders.
-    pub fn new(gpu: &'a Gpu, buffers: &'a SceneBuffers<'a>) -> Result<Self, Error> {
+    pub fn new(gpu: &'a Gpu, buffers: &'a SceneBuffers) -> Result<Self, Error> {
         let readback =
             SeenReadback::new(gpu.device(), &gpu.support()).map_err(umbrage_render::Error::from)?;
         let renderer = Renderer::new(gpu, buffers, &ShadowOptions::default())?;

@@ -59,6 +59,15 @@ impl Receivers {
         Self { all, casters, parts: None, fit: Fit::Box }
     }
 
+    /// Returns the boxes around the scene's instances as receivers. They are quickly found, which
+    /// serves scenes that move, and looser than those around surfaces.
+    pub fn around_instances(scene: &Scene) -> Self {
+        let boxes = scene.instance_boxes().into_iter().enumerate();
+        let seen = boxes.filter(|(i, aabb)| scene.roles.of(*i).is_receiver() && !aabb.is_empty());
+        let parts = BoxTree::new(&seen.map(|(_, aabb)| aabb).collect::<Vec<_>>()).ok();
+        Self { parts, fit: Fit::Surfaces, ..Self::in_box(scene) }
+    }
+
     /// Returns whether the maps are fitted to what is seen.
     pub(crate) fn are_seen(&self) -> bool {
         self.fit == Fit::Seen

@@ -31,10 +31,6 @@ pub struct Session {
     pub changes: SceneOptions,
     /// Whether alpha-masked materials are treated as solid.
     pub opaque: bool,
-    /// The animation that is played, by a word that chooses it.
-    pub animation: Option<String>,
-    /// The time within the animation, seconds, ≥ 0.
-    pub time_s: Option<f64>,
     /// The view, with the size of the picture.
     pub view: ViewOptions,
     /// The light; without one, the scene's own.
@@ -165,6 +161,9 @@ impl Session {
         add("sun", numbers(sun));
         add("light", light);
         add("light-size", light_size.map(|size| size.to_string()));
+        add("animation", self.changes.animation.clone());
+        let time_s = self.changes.animation.as_ref().map(|_| self.changes.time_s);
+        add("time", number(time_s));
         add("fit", (self.fit != Fit::default()).then(|| self.fit.name().to_owned()));
         let flags = [("--ground", self.changes.ground), ("--opaque", self.opaque)];
         words
@@ -206,10 +205,10 @@ impl Session {
             changes: SceneOptions {
                 without: keys.take("without")?.unwrap_or_default(),
                 ground: keys.take("ground")?.unwrap_or_default(),
+                animation: keys.take("animation")?,
+                time_s: keys.take("time")?.map(read_seconds).transpose()?.unwrap_or_default(),
             },
             opaque: keys.take("opaque")?.unwrap_or_default(),
-            animation: keys.take("animation")?,
-            time_s: keys.take("time")?.map(read_seconds).transpose()?,
             view,
             light: LightOptions { sun: sun.map(vector).or(sun_angles), light: keys.take("light")? },
             headlight: keys.take("headlight")?.unwrap_or_default(),
@@ -242,8 +241,8 @@ impl Session {
             ("without", (!changes.without.is_empty()).then(|| json!(changes.without))),
             ("ground", flag(changes.ground)),
             ("opaque", flag(self.opaque)),
-            ("animation", text(&self.animation)),
-            ("time", number(self.time_s)),
+            ("animation", text(&changes.animation)),
+            ("time", number((changes.time_s != 0.0).then_some(changes.time_s))),
             ("camera", text(&view.camera)),
             ("eye", vector(view.eye)),
             ("target", vector(view.target)),
@@ -284,10 +283,7 @@ fn read<T: FromStr<Err: std::error::Error>>(key: &str, text: &str) -> Result<T, 
 }
 
 fn read_seconds(seconds: f64) -> Result<f64, String> {
-    match (0.0..=1e9).contains(&seconds) {
-        true => Ok(seconds),
-        false => Err(format!("time: must be a number of seconds, 0 to 1e9, is {seconds}")),
-    }
+    values::seconds(seconds).map_err(|problem| format!("time: {problem}"))
 }
 
 fn read_fit(text: &str) -> Result<Fit, String> {
@@ -334,10 +330,13 @@ mod tests {
     fn full() -> Session {
         Session {
             scene: "town:20".to_owned(),
-            changes: SceneOptions { without: vec!["a lamp".to_owned()], ground: true },
+            changes: SceneOptions {
+                without: vec!["a lamp".to_owned()],
+                ground: true,
+                animation: Some("walk".to_owned()),
+                time_s: 1.25,
+            },
             opaque: true,
-            animation: Some("walk".to_owned()),
-            time_s: Some(1.25),
             view: ViewOptions {
                 eye: Some(DVec3::new(0.1, 2.0, -1e6)),
                 target: Some(DVec3::new(0.0, 1.0, 0.0)),

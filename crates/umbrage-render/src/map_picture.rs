@@ -147,7 +147,7 @@ impl MapPicture {
     }
 }
 
-impl Renderer<'_, '_> {
+impl Renderer<'_> {
     /// Draws a shadow map as a grey picture into a target of any size, without waiting for the
     /// device. `map` is its index in the plan whose maps were drawn last. The picture spans the map
     /// from (s, t) = (0, 0) in the upper left corner to (1, 1) in the lower right one. The nearest

@@ -70,7 +70,7 @@ impl OverlayUniform {
     }
 }
 
-impl Renderer<'_, '_> {
+impl Renderer<'_> {
     /// Draws a frame as [`frame`](Self::frame) does, with an overlay.
     ///
     /// # Errors

@@ -217,6 +217,11 @@ impl<'a> Tracer<'a> {
         Self { opaque, ..self }
     }
 
+    /// Whether alpha masks are ignored.
+    pub fn is_opaque(&self) -> bool {
+        self.opaque
+    }
+
     /// The scene that rays are traced in.
     pub fn scene(&self) -> &'a Scene {
         self.scene

@@ -8,19 +8,19 @@ const STEEPEST_DEG: f64 = 89.0;
 /// The eye, the point that it looks at, and the direction that stays up while the view turns. The
 /// target is also the point that an orbit is around.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub(crate) struct Pose {
     /// Position of the eye, world space, metres.
-    pub eye: DVec3,
+    pub(crate) eye: DVec3,
     /// The point in the middle of the picture, world space, metres.
-    pub target: DVec3,
+    pub(crate) target: DVec3,
     /// Unit vector.
-    pub up: DVec3,
+    pub(crate) up: DVec3,
 }
 
 impl Pose {
     /// A pose whose `up` is the world's wherever that gives the same picture as the camera's own,
     /// so that turning to the side keeps the horizon level.
-    pub fn new(eye: DVec3, target: DVec3, up: DVec3) -> Self {
+    pub(crate) fn new(eye: DVec3, target: DVec3, up: DVec3) -> Self {
         let forward = target - eye;
         let is_level = forward.cross(up).normalize_or_zero().y.abs() < 1e-6 && up.y > 0.0;
         let is_vertical = forward.cross(DVec3::Y).length() < 1e-6 * forward.length();
@@ -29,17 +29,17 @@ impl Pose {
     }
 
     /// Distance from the eye to the target, metres.
-    pub fn distance(&self) -> f64 {
+    pub(crate) fn distance(&self) -> f64 {
         self.eye.distance(self.target)
     }
 
     /// The view direction, a unit vector.
-    pub fn forward(&self) -> DVec3 {
+    pub(crate) fn forward(&self) -> DVec3 {
         (self.target - self.eye).normalize_or(DVec3::NEG_Z)
     }
 
     /// The direction to the right in the picture, a unit vector.
-    pub fn right(&self) -> DVec3 {
+    pub(crate) fn right(&self) -> DVec3 {
         self.forward()
             .cross(self.up)
             .try_normalize()
@@ -47,19 +47,19 @@ impl Pose {
     }
 
     /// Turns the head: to the right and upwards, radians.
-    pub fn look(&mut self, right_rad: f64, up_rad: f64) {
+    pub(crate) fn look(&mut self, right_rad: f64, up_rad: f64) {
         let distance = self.distance();
         self.target = self.eye + self.turned(right_rad, up_rad) * distance;
     }
 
     /// Moves the eye around the target: to the right and upwards, radians.
-    pub fn orbit(&mut self, right_rad: f64, up_rad: f64) {
+    pub(crate) fn orbit(&mut self, right_rad: f64, up_rad: f64) {
         let distance = self.distance();
         self.eye = self.target - self.turned(-right_rad, -up_rad) * distance;
     }
 
     /// Moves the viewer to the right, upwards and forward, metres.
-    pub fn walk(&mut self, step: DVec3) {
+    pub(crate) fn walk(&mut self, step: DVec3) {
         let right = self.right();
         let forward = self.forward();
         let moved = right * step.x + right.cross(forward) * step.y + forward * step.z;
@@ -68,7 +68,7 @@ impl Pose {
     }
 
     /// Brings the eye nearer to the target, to this share of its distance.
-    pub fn approach(&mut self, share: f64) {
+    pub(crate) fn approach(&mut self, share: f64) {
         let distance = (self.distance() * share).clamp(1e-6, 1e11);
         self.eye = self.target - self.forward() * distance;
     }

@@ -3,7 +3,7 @@
 use crate::settings::{Compare, LightSetting, OverlayKind, Settings, TRUTH};
 use crate::stage::SceneInfo;
 use std::path::Path;
-use umbrage_lab::{LightOptions, Session, ViewOptions};
+use umbrage_lab::{LightOptions, SceneOptions, Session, ViewOptions};
 use umbrage_scene::Lens;
 
 /// How a session's `compare` ends where the second picture is the truth.
@@ -15,6 +15,8 @@ pub(crate) struct ToOpen {
     pub(crate) settings: Settings,
     pub(crate) view: ViewOptions,
     pub(crate) light: LightOptions,
+    /// The word of an animation, and the time in it, seconds.
+    pub(crate) clip: Option<(String, f64)>,
     /// Whether the settings have a view and a light already.
     pub(crate) has_view: bool,
 }
@@ -32,7 +34,7 @@ impl ToOpen {
             ..settings.clone()
         };
         let (view, light) = (ViewOptions::default(), LightOptions::default());
-        Self { settings, view, light, has_view: false }
+        Self { settings, view, light, clip: None, has_view: false }
     }
 
     /// A session that was read.
@@ -55,7 +57,8 @@ impl ToOpen {
         }
         let mut to_open = Self::scene(&session.scene, settings);
         to_open.settings = Settings {
-            changes: session.changes.clone(),
+            // The window poses the scene itself.
+            changes: SceneOptions { animation: None, time_s: 0.0, ..session.changes.clone() },
             opaque: session.opaque,
             techniques,
             compare: known("compare", compare, &Compare::ALL)?,
@@ -67,6 +70,7 @@ impl ToOpen {
         if session.headlight {
             to_open.settings.light = LightSetting::Headlight;
         }
+        to_open.clip = session.changes.animation.clone().map(|word| (word, session.changes.time_s));
         to_open.view = session.view.clone();
         to_open.light = session.light_options();
         Ok(to_open)
@@ -120,15 +124,16 @@ impl Settings {
         let with_truth = self.compares_with_truth();
         let count = if self.compare.is_of_two() && !with_truth { 2 } else { 1 };
         let techniques = self.techniques[..count].iter().map(|text| text.parse());
+        let clip = self.clip.and_then(|clip| info.clips.get(clip));
+        let animation = clip.map(|(word, _)| word.clone());
+        let time_s = if clip.is_some() { self.time_s } else { 0.0 };
         let compare =
             Compare::ALL.iter().find(|(c, ..)| *c == self.compare).map(|(_, name, _)| *name);
         let overlay = OverlayKind::ALL.iter().find(|(o, ..)| *o == self.overlay);
         Ok(Session {
             scene: self.scene.clone(),
-            changes: self.changes.clone(),
+            changes: SceneOptions { animation, time_s, ..self.changes.clone() },
             opaque: self.opaque,
-            animation: self.clip.and_then(|clip| Some(info.clips.get(clip)?.0.clone())),
-            time_s: self.clip.map(|_| self.time_s),
             view,
             light,
             headlight: self.light == LightSetting::Headlight,

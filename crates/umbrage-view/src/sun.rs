@@ -5,16 +5,16 @@ use umbrage_lab::values::sun_direction;
 
 /// A sun by where it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sun {
+pub(crate) struct Sun {
     /// Clockwise from north (−z; east is +x), degrees, −360 to 360.
-    pub azimuth_deg: f64,
+    pub(crate) azimuth_deg: f64,
     /// Above the horizon, degrees, −90 to 90.
-    pub elevation_deg: f64,
+    pub(crate) elevation_deg: f64,
 }
 
 impl Sun {
     /// The sun whose light travels in this direction, of any length but 0.
-    pub fn from_direction(direction: DVec3) -> Self {
+    pub(crate) fn from_direction(direction: DVec3) -> Self {
         let to_sun = -direction.normalize_or(DVec3::NEG_Y);
         Self {
             azimuth_deg: to_sun.x.atan2(-to_sun.z).to_degrees().rem_euclid(360.0),
@@ -23,7 +23,7 @@ impl Sun {
     }
 
     /// The direction in which the light travels, a unit vector.
-    pub fn direction(self) -> DVec3 {
+    pub(crate) fn direction(self) -> DVec3 {
         let angles = [self.azimuth_deg % 360.0, self.elevation_deg.clamp(-90.0, 90.0)];
         sun_direction(angles).unwrap_or(DVec3::NEG_Y)
     }
@@ -31,7 +31,7 @@ impl Sun {
     /// The sun at this time of the sun itself, hours (12 is noon), on the longest day at a latitude
     /// of 45° north: from east over south to west, at most 68.4° high. It is below the horizon
     /// before 4:16 and after 19:44.
-    pub fn at_hour(hour: f64) -> Self {
+    pub(crate) fn at_hour(hour: f64) -> Self {
         const LATITUDE_DEG: f64 = 45.0;
         const DECLINATION_DEG: f64 = 23.44;
         let (sin_lat, cos_lat) = LATITUDE_DEG.to_radians().sin_cos();

@@ -85,10 +85,10 @@ mod tests {
             changes: SceneOptions {
                 without: vec!["*".to_owned(), "a\\b".to_owned()],
                 ground: true,
+                animation: Some("#2".to_owned()),
+                time_s: 0.75,
             },
             opaque: true,
-            animation: None,
-            time_s: None,
             view: ViewOptions {
                 eye: Some(DVec3::new(-0.1, 1.0 / 3.0, 1e-9)),
                 target: Some(DVec3::new(-1e6, 0.0, 2.0)),

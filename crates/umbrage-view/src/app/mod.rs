@@ -16,7 +16,7 @@ use crate::Outcome;
 use crate::action::Panel;
 use crate::session::ToOpen;
 use crate::settings::{LightSetting, Settings};
-use crate::stage::{Frame, Job, News, Request, SceneInfo, SceneToOpen, SharedTruth, Stage};
+use crate::stage::{Frame, Job, News, Request, SceneInfo, SceneToOpen, Stage};
 use egui::Ui;
 use measured::{History, Judged, Presets};
 pub(crate) use script::Driver;
@@ -221,7 +221,7 @@ impl<'k> App<'k> {
     }
 
     fn opened(&mut self, info: Arc<SceneInfo>) {
-        let Some((ToOpen { mut settings, view, light: _, has_view }, ..)) = self.opening.take()
+        let Some((ToOpen { mut settings, view, clip, has_view, .. }, ..)) = self.opening.take()
         else {
             return;
         };
@@ -233,6 +233,10 @@ impl<'k> App<'k> {
             if is_headlight {
                 settings.light = LightSetting::Headlight;
             }
+        }
+        if let Some((word, time_s)) = clip {
+            settings.clip = info.clips.iter().position(|(known, _)| *known == word);
+            settings.time_s = time_s;
         }
         self.path.clone_from(&settings.scene);
         self.drafts = [0, 1].map(|i| technique::Draft::new(&settings.techniques[i]));
@@ -289,11 +293,6 @@ impl<'k> App<'k> {
         let seconds = now.duration_since(self.last_tick).min(Duration::from_millis(250));
         self.last_tick = now;
         seconds.as_secs_f64()
-    }
-
-    /// The truth of the frame that is shown.
-    fn truth(&self) -> Option<&SharedTruth> {
-        self.judged.truth.as_ref()
     }
 
     /// Looks after the device. Gives whether the window must be opened again.

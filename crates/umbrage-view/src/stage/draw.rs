@@ -2,6 +2,7 @@
 
 use super::errors::Visibility;
 use super::mailbox::Mailbox;
+use super::posed::Posed;
 use super::request::{Costs, DrawnPicture, Frame, Picture, Request, Shining};
 use super::truth::{SharedTruth, TruthJob};
 use super::{News, Reporter};
@@ -9,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use umbrage::visibility::Filter;
-use umbrage::{Bounds, Camera, Light, Plan, Planner, SeenTiles, Technique};
+use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles, Technique};
 use umbrage_lab::{
     Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, milliseconds,
     plan_with, planner, runs_on_gpu,
@@ -32,13 +33,14 @@ const ROWS: u32 = 128;
 pub(super) struct Artist<'a> {
     prepared: &'a PreparedScene<'a>,
     gpu: &'a Gpu,
-    buffers: &'a SceneBuffers<'a>,
+    buffers: &'a SceneBuffers,
     reporter: &'a Reporter,
     frames: &'a AtomicU64,
     easels: Vec<Easel<'a>>,
     bare: Bare<'a>,
     receivers: Vec<(Fit, Receivers)>,
     scout: Option<Scout<'a>>,
+    posed: Option<Posed>,
     /// The last frame, and whether its truth and errors were asked for.
     last: Option<(Arc<Frame>, bool)>,
 }
@@ -46,16 +48,24 @@ pub(super) struct Artist<'a> {
 /// What draws one of a frame's pictures.
 struct Easel<'a> {
     /// The one that was used last comes last.
-    renderers: Vec<(ShadowOptions, Renderer<'a, 'a>)>,
+    renderers: Vec<Brush<'a>>,
     planner: Planner,
     targets: Targets,
     timer: Option<Timer>,
     times: Option<StageTimes>,
 }
 
+/// A renderer for techniques with these options.
+struct Brush<'a> {
+    options: ShadowOptions,
+    renderer: Renderer<'a>,
+    /// Boxes around the casters that changed since its maps were drawn.
+    moved: Vec<Aabb>,
+}
+
 /// What draws pictures without lookups.
 struct Bare<'a> {
-    renderer: Option<Renderer<'a, 'a>>,
+    renderer: Option<Renderer<'a>>,
     targets: Targets,
     timer: Option<Timer>,
     ms: Option<f64>,
@@ -101,8 +111,28 @@ impl<'a> Artist<'a> {
             },
             receivers: Vec::new(),
             scout: None,
+            posed: None,
             last: None,
         })
+    }
+
+    /// Poses the scene.
+    fn pose(&mut self, moment: Option<(usize, f64)>) -> Result<(), String> {
+        if moment.is_none() && self.posed.is_none() {
+            return Ok(());
+        }
+        let rest = self.tracer().scene();
+        let posed = self.posed.get_or_insert_with(|| Posed::new(rest));
+        let moved = posed.set(moment, self.gpu, self.buffers)?;
+        for brush in self.easels.iter_mut().flat_map(|easel| &mut easel.renderers) {
+            brush.moved.extend_from_slice(&moved);
+        }
+        Ok(())
+    }
+
+    /// The scene in the pose of an animation, if it is not at rest.
+    fn in_motion(&self) -> Option<&Posed> {
+        self.posed.as_ref().filter(|posed| !posed.is_at_rest())
     }
 
     fn tracer(&self) -> &'a Tracer<'a> {
@@ -111,9 +141,13 @@ impl<'a> Artist<'a> {
 
     /// Draws a frame and sends it to the window.
     pub(super) fn draw(&mut self, request: Request) {
+        if let Err(problem) = self.pose(request.moment) {
+            self.reporter.tell(News::Refused(problem));
+        }
+        let scene = self.in_motion().map_or(self.tracer().scene(), Posed::scene);
         let light = match request.light {
             Shining::Light(light) => light,
-            Shining::OfScene(index) => match self.tracer().scene().lights.get(index) {
+            Shining::OfScene(index) => match scene.lights.get(index) {
                 Some(light) => light.light,
                 None => return,
             },
@@ -172,7 +206,11 @@ impl<'a> Artist<'a> {
             return Err("no GPU rasterises bent rows; `umbrage render` traces them".into());
         }
         let (gpu, buffers, tracer) = (self.gpu, self.buffers, self.tracer());
-        let receivers = receivers(&mut self.receivers, self.prepared, request.fit);
+        let posed = self.posed.as_ref().filter(|posed| !posed.is_at_rest());
+        let receivers = match posed {
+            Some(posed) => posed.receivers(),
+            None => receivers(&mut self.receivers, self.prepared, request.fit),
+        };
         let bounds = receivers.bounds(seen);
         while self.easels.len() <= index {
             self.easels.push(Easel::new(gpu));
@@ -182,13 +220,17 @@ impl<'a> Artist<'a> {
         let plan = easel.plan(technique, planned_for, light, &bounds).map_err(|e| e.to_string())?;
         let plan_ms = milliseconds(start);
         let target = easel.targets.free(gpu, request.camera.image())?;
-        let (renderer, mut timer) = easel.renderer(gpu, buffers, technique, plan.fade.is_some())?;
+        let (brush, mut timer) = easel.brush(gpu, buffers, technique, plan.fade.is_some())?;
+        let Brush { renderer, moved, .. } = brush;
         let text = |e: umbrage_render::Error| e.to_string();
-        renderer.leave_out(edge_on(&plan, tracer));
+        // The rays know the scene at rest.
+        renderer.leave_out(if posed.is_some() { Vec::new() } else { edge_on(&plan, tracer) });
+        let casters = if moved.is_empty() { Casters::Unmoved } else { Casters::MovedIn(moved) };
         let eye = request.camera.eye();
         let maps = renderer
-            .draw_maps_seen_from(eye, &plan, Casters::Unmoved, timer.as_deref_mut())
+            .draw_maps_seen_from(eye, &plan, casters, timer.as_deref_mut())
             .map_err(text)?;
+        moved.clear();
         let shading = Shading { camera: &request.camera, light, light_index: 0 };
         let picture = match request.overlay {
             None => renderer.frame(&shading, &target, timer),
@@ -227,7 +269,7 @@ impl<'a> Artist<'a> {
     fn map(&mut self, map: usize) -> Option<Arc<FrameTarget>> {
         let gpu = self.gpu;
         let easel = self.easels.first_mut()?;
-        let (_, renderer) = easel.renderers.last_mut()?;
+        let renderer = &mut easel.renderers.last_mut()?.renderer;
         let [width, height] = renderer.shadows().place(map)?.size;
         let most = width.max(height).div_ceil(MAP_SIDE);
         let target = easel.targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
@@ -270,21 +312,22 @@ impl<'a> Artist<'a> {
         let picture = SharedTruth::new(frame.number, &camera);
         self.reporter.tell(News::Truth(picture.clone()));
         let light_size = frame.request.light_size;
-        truths.put(TruthJob { camera, light: frame.light, light_size, picture });
+        let posed = self.posed.as_ref().and_then(Posed::shared);
+        truths.put(TruthJob { camera, light: frame.light, light_size, posed, picture });
         let shading = Shading { camera: &camera, light: &frame.light, light_index: 0 };
         let height = camera.image()[1];
         for (technique, picture) in frame.pictures.iter().enumerate() {
             if picture.drawn.is_err() {
                 continue;
             }
-            let Some((_, renderer)) = self.easels[technique].renderers.last_mut() else { continue };
+            let Some(brush) = self.easels[technique].renderers.last_mut() else { continue };
             let mut values = Vec::with_capacity((camera.image()[0] * height) as usize);
             for first in (0..height).step_by(ROWS as usize) {
                 if is_moving() {
                     return;
                 }
                 let rows = first..height.min(first + ROWS);
-                match renderer.samples(&shading, rows, 1, false) {
+                match brush.renderer.samples(&shading, rows, 1, false) {
                     Ok(samples) => values.extend(samples.iter().map(|s| s.visibility)),
                     Err(e) => return self.reporter.tell(News::Refused(e.to_string())),
                 }
@@ -361,28 +404,27 @@ impl<'a> Easel<'a> {
     }
 
     /// The renderer of a technique, and the timer of its frames.
-    fn renderer(
+    fn brush(
         &mut self,
         gpu: &'a Gpu,
-        buffers: &'a SceneBuffers<'a>,
+        buffers: &'a SceneBuffers,
         technique: &NamedTechnique,
         fades: bool,
-    ) -> Result<(&mut Renderer<'a, 'a>, Option<&mut Timer>), String> {
+    ) -> Result<(&mut Brush<'a>, Option<&mut Timer>), String> {
         let options = shadow_options(technique.technique(), fades);
-        let known = self.renderers.iter().position(|(known, _)| *known == options);
-        let renderer = match known {
+        let brush = match self.renderers.iter().position(|brush| brush.options == options) {
             Some(known) => self.renderers.remove(known),
             None => {
-                let made = Renderer::new(gpu, buffers, &options).map_err(|e| e.to_string())?;
-                (options, made)
+                let renderer = Renderer::new(gpu, buffers, &options).map_err(|e| e.to_string())?;
+                Brush { options, renderer, moved: Vec::new() }
             }
         };
         if self.renderers.len() >= RENDERERS {
             self.renderers.remove(0);
         }
-        self.renderers.push(renderer);
+        self.renderers.push(brush);
         let last = self.renderers.len() - 1;
-        Ok((&mut self.renderers[last].1, self.timer.as_mut()))
+        Ok((&mut self.renderers[last], self.timer.as_mut()))
     }
 
     fn read_times(&mut self, gpu: &Gpu) {

@@ -54,8 +54,6 @@ pub(crate) struct Worth {
     pub(crate) frame_ms: f64,
     /// Memory that lookups read, bytes.
     pub(crate) bytes: u64,
-    /// Number of texels of all maps.
-    pub(crate) texels: u64,
 }
 
 /// Does jobs until the scene is given up.
@@ -109,7 +107,7 @@ impl Worker<'_, '_> {
     ) -> Result<String, String> {
         let tracer = self.prepared.render().tracer();
         let picture = SharedTruth::new(0, &camera);
-        let job = TruthJob { camera, light, light_size, picture };
+        let job = TruthJob { camera, light, light_size, posed: None, picture };
         let parts = techniques.len() as f32 + 1.0;
         let grew = || {
             let share = job.picture.lock().share;
@@ -161,7 +159,6 @@ impl Worker<'_, '_> {
             plan_ms,
             frame_ms,
             bytes: executor.bytes(),
-            texels: plan.texels(),
         })
     }
 

@@ -5,6 +5,7 @@ mod draw;
 mod errors;
 mod jobs;
 mod mailbox;
+mod posed;
 mod request;
 mod scene;
 mod truth;
@@ -122,11 +123,6 @@ impl Stage {
             let news = News::Failed(format!("no thread for the scene: {e}"));
             let _ = self.sender.send(FromScene { scene: self.scenes, news });
         }
-    }
-
-    /// Whether a scene is being opened.
-    pub(crate) fn is_opening(&self) -> bool {
-        self.coming.is_some()
     }
 
     /// Gives up the scene that is being opened.

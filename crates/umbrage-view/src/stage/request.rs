@@ -134,7 +134,7 @@ pub(crate) struct SceneInfo {
     pub(crate) cameras: Vec<(String, SceneCamera)>,
     /// The words that choose the lights, and the lights.
     pub(crate) lights: Vec<(String, Light)>,
-    /// Names and durations (seconds) of the animations' clips.
+    /// The words that choose the animations' clips, and their durations, seconds.
     pub(crate) clips: Vec<(String, f64)>,
     /// What was repaired or left out on loading.
     pub(crate) notices: Vec<String>,

@@ -3,6 +3,7 @@
 use super::draw::Artist;
 use super::jobs::{Job, do_jobs};
 use super::mailbox::{Mail, Mailbox};
+use super::posed::boxes_in_motion;
 use super::request::{Request, SceneInfo};
 use super::truth::{TruthJob, trace_jobs};
 use super::{News, Reporter};
@@ -74,15 +75,20 @@ fn open_and_draw(
     let chosen = choose_view(view, prepared.defaults()).map_err(|e| e.to_string())?;
     let chosen_light = choose_light(light, prepared.defaults()).map_err(|e| e.to_string())?;
     let (cameras, lights) = SceneInfo::cameras_and_lights(&scene);
+    let in_motion = boxes_in_motion(&scene);
+    let mut boxes = prepared.render().tracer().boxes(umbrage_lab::SURFACE_BOXES);
+    boxes.extend_from_slice(&in_motion);
+    let clips = SceneInfo::words(&scene.animation_choices()).into_iter();
+    let clips = clips.zip(scene.animations.clips().iter().map(|clip| clip.duration_s));
     let notices = scene.all_notices().into_iter().map(|n| n.0);
     let info = SceneInfo {
         name: name.clone(),
         cameras,
         lights,
-        clips: Vec::new(),
+        clips: clips.collect(),
         notices: notices.chain(chosen.notices).collect(),
-        bounds: scene.bounds(),
-        boxes: prepared.render().tracer().boxes(umbrage_lab::SURFACE_BOXES),
+        bounds: in_motion.into_iter().fold(scene.bounds(), umbrage::Aabb::union),
+        boxes,
         view: chosen.view,
         view_name: chosen.name,
         light: chosen_light.light,

@@ -9,6 +9,7 @@ use std::time::Instant;
 use umbrage::visibility::LightSize;
 use umbrage::{Camera, Light};
 use umbrage_measure::Rgb;
+use umbrage_scene::Scene;
 use umbrage_trace::{AreaLight, Sample, Tracer, View, shade};
 
 /// The truth that is wanted.
@@ -17,6 +18,8 @@ pub(super) struct TruthJob {
     pub(super) camera: Camera,
     pub(super) light: Light,
     pub(super) light_size: Option<LightSize>,
+    /// The scene in the pose of an animation; `None`: the scene at rest.
+    pub(super) posed: Option<Arc<Scene>>,
     pub(super) picture: SharedTruth,
 }
 
@@ -109,7 +112,7 @@ pub(super) fn trace_jobs(tracer: &Tracer<'_>, jobs: &Mailbox<TruthJob>, grew: im
     loop {
         match jobs.take(None) {
             Mail::New(job) => {
-                if let Err(problem) = trace(tracer, &job, &|| jobs.is_pending(), &grew) {
+                if let Err(problem) = trace_posed(tracer, &job, &|| jobs.is_pending(), &grew) {
                     let mut picture = job.picture.lock();
                     picture.problem = Some(problem);
                     picture.version += 1;
@@ -118,6 +121,22 @@ pub(super) fn trace_jobs(tracer: &Tracer<'_>, jobs: &Mailbox<TruthJob>, grew: im
             }
             Mail::None => {}
             Mail::Closed => return,
+        }
+    }
+}
+
+/// Traces one job in its pose, as long as it is not out of date.
+fn trace_posed(
+    at_rest: &Tracer<'_>,
+    job: &TruthJob,
+    is_out_of_date: &dyn Fn() -> bool,
+    grew: &dyn Fn(),
+) -> Result<(), String> {
+    match &job.posed {
+        None => trace(at_rest, job, is_out_of_date, grew),
+        Some(scene) => {
+            let tracer = Tracer::new(scene).map_err(|e| e.to_string())?;
+            trace(&tracer.opaque(at_rest.is_opaque()), job, is_out_of_date, grew)
         }
     }
 }
@@ -235,7 +254,7 @@ mod tests {
         })
         .unwrap();
         let light = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.5) };
-        TruthJob { camera, light, light_size, picture: SharedTruth::new(7, &camera) }
+        TruthJob { camera, light, light_size, posed: None, picture: SharedTruth::new(7, &camera) }
     }
 
     #[test]
