@@ -4,10 +4,11 @@ use super::App;
 use super::controls::sun_action;
 use super::picture::share;
 use crate::action::{Action, Panel};
-use crate::settings::{Compare, LightSetting, OverlayKind};
+use crate::settings::{Compare, OverlayKind};
 use crate::sun::Sun;
 use egui::{EventFilter, Key, Modifiers, PointerButton, Rect, Response, Ui};
 use glam::{DVec2, DVec3};
+use umbrage::Light;
 
 /// Angle of a turn for a point that the mouse moves, degrees.
 const TURN_DEG: f64 = 0.3;
@@ -42,10 +43,11 @@ pub(super) const KEYS: &[(&str, &str)] = &[
 ];
 
 impl App<'_> {
-    /// The sun that shines, or the one that would if there is another light.
+    /// The sun that shines, or the one from which a drag begins if there is another light.
     pub(super) fn sun(&self) -> Sun {
-        let other = || match &self.kept.settings.light {
-            LightSetting::Headlight => Sun::from_direction(self.kept.settings.pose.forward()),
+        let light = self.frame.as_ref().map(|frame| frame.light);
+        let other = || match light {
+            Some(Light::Directional { direction }) => Sun::from_direction(direction),
             _ => Sun { azimuth_deg: 135.0, elevation_deg: 45.0 },
         };
         self.kept.settings.sun().unwrap_or_else(other)

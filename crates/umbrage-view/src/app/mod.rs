@@ -274,17 +274,17 @@ impl<'k> App<'k> {
                 if self.asked.as_ref() != Some(&request) {
                     self.stage.draw(request.clone());
                     self.asked = Some(request);
+                    self.problem = None;
                 }
             }
             Err(problem) => self.problem = Some(problem),
         }
     }
 
-    /// Whether the picture shows what is asked for.
+    /// Whether the picture shows what is asked for, or cannot.
     fn is_up_to_date(&self) -> bool {
-        self.opening.is_none()
-            && self.info.is_some()
-            && self.frame.as_ref().map(|f| &f.request) == self.asked.as_ref()
+        let shows = self.frame.as_ref().is_some_and(|f| Some(&f.request) == self.asked.as_ref());
+        self.opening.is_none() && (shows || self.info.is_none() || self.problem.is_some())
     }
 
     /// The seconds since the last frame of the window.

@@ -243,6 +243,7 @@ fn number(ui: &mut Ui, label: &str, scale: &Scale, value: &str, tip: &str) -> Op
         .logarithmic(scale.is_logarithmic)
         .clamping(egui::SliderClamping::Never)
         .step_by(if is_whole { 1.0 } else { 0.0 })
+        .max_decimals(if is_whole { 0 } else { 3 })
         .suffix(scale.unit)
         .text(label);
     let is_changed = ui.add(slider).tip(tip).changed();
