@@ -83,6 +83,7 @@ impl Session {
     pub fn check(&self) -> Result<(), Error> {
         self.view.check()?;
         self.light.check()?;
+        values::seconds(self.changes.time_s).map_err(|p| Error::field(Field::Time, p))?;
         if self.techniques.is_empty() {
             return Err(Error::field(Field::Shadows, "must have at least one technique"));
         }
@@ -206,7 +207,7 @@ impl Session {
                 without: keys.take("without")?.unwrap_or_default(),
                 ground: keys.take("ground")?.unwrap_or_default(),
                 animation: keys.take("animation")?,
-                time_s: keys.take("time")?.map(read_seconds).transpose()?.unwrap_or_default(),
+                time_s: keys.take("time")?.unwrap_or_default(),
             },
             opaque: keys.take("opaque")?.unwrap_or_default(),
             view,
@@ -280,10 +281,6 @@ impl Keys {
 
 fn read<T: FromStr<Err: std::error::Error>>(key: &str, text: &str) -> Result<T, String> {
     text.parse().map_err(|e: T::Err| format!("{key}: {text}: {}", with_causes(&e)))
-}
-
-fn read_seconds(seconds: f64) -> Result<f64, String> {
-    values::seconds(seconds).map_err(|problem| format!("time: {problem}"))
 }
 
 fn read_fit(text: &str) -> Result<Fit, String> {

@@ -56,6 +56,10 @@ impl SceneChangeArgs {
         self.opaque |= session.opaque;
         self.ground |= session.changes.ground;
         self.without.extend_from_slice(&session.changes.without);
+        if self.animation.is_none() {
+            self.animation.clone_from(&session.changes.animation);
+            self.time = session.changes.time_s;
+        }
     }
 }
 

@@ -102,6 +102,8 @@ fn sessions_that_are_none() {
         (with("far", json!(0.1)), "--session: s.json: far: must exceed near (0.5), is 0.1"),
         (with("shadows", json!(["lipsm"])), "did you mean `lispsm`?"),
         (with("scene", json!("nowhere.gltf")), "there is no file nowhere.gltf"),
+        (with("time", json!(-1)), "--session: s.json: time: must"),
+        (with("animation", json!("walk")), "--animation: the scene has no animation `walk`"),
         (with("scene", json!("twon")), "did you mean `town`?"),
     ] {
         desk.write("s.json", &text);
