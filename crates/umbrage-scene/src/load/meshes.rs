@@ -63,13 +63,10 @@ impl Loader<'_> {
             let made = self.load_primitives(mesh, &deforming)?;
             self.grow_instances(&place, made.len() as u64)?;
             for made in made {
-                let stands = match made.posed {
-                    Some(_) => Place::Skin,
-                    None => {
-                        let anchor = Anchor::Fixed(DAffine3::IDENTITY);
-                        Place::Node { anchor, node_from_copy: None }
-                    }
-                };
+                // Without joints of its own, a primitive stays where it is.
+                let unmoved =
+                    Place { anchor: Anchor::Fixed(DAffine3::IDENTITY), node_from_copy: None };
+                let stands = made.posed.is_none().then_some(unmoved);
                 let origin = made.posed.unwrap_or(DVec3::ZERO);
                 self.add_instance(made, DAffine3::from_translation(origin), stands, &place);
             }
@@ -96,15 +93,14 @@ impl Loader<'_> {
         let taken = document.budget.taken();
         let load = |count| Copies::load(document, node, &place, count as usize);
         let copies = count.map(load).transpose()?;
-        let world_from_node = self.hierarchy.world_from_node[index];
-        let anchor = self.rigging.anchor(index).unwrap_or(Anchor::Fixed(world_from_node));
+        let anchor = self.rigging.anchor_of(index);
         for i in 0..count.unwrap_or(1) as usize {
             let copies = copies.as_ref();
             let node_from_copy = copies.map(|c| c.node_from_copy(document, i)).transpose()?;
-            let world_from_mesh = node_from_copy.map_or(world_from_node, |c| world_from_node * c);
-            let stands = Place::Node { anchor, node_from_copy };
+            let stands = Place { anchor, node_from_copy };
+            let world_from_mesh = stands.world(&self.rigging.animations.nodes);
             for &made in &made {
-                self.add_instance(made, world_from_mesh, stands, &place);
+                self.add_instance(made, world_from_mesh, Some(stands), &place);
             }
         }
         document.budget.give_back_to(taken);
@@ -117,11 +113,17 @@ impl Loader<'_> {
     }
 
     /// Adds an instance. If its transform is flat, it is left out, or absent if a clip moves it.
-    fn add_instance(&mut self, made: Made, world_from_mesh: DAffine3, stands: Place, place: &str) {
+    fn add_instance(
+        &mut self,
+        made: Made,
+        world_from_mesh: DAffine3,
+        stands: Option<Place>,
+        place: &str,
+    ) {
         let Made { mesh, deformed, .. } = made;
         let instance = self.scene.instances.len();
         let is_carried =
-            deformed.is_some() || matches!(stands, Place::Node { anchor: Anchor::Moving(_), .. });
+            deformed.is_some() || stands.is_some_and(|s| matches!(s.anchor, Anchor::Moving(_)));
         if !is_carried {
             if animation::is_flat(world_from_mesh.matrix3) {
                 self.notices.add(place, "its transform flattens its mesh, left out");
