@@ -29,9 +29,11 @@ struct Deforming<'a> {
 
 /// A primitive of a mesh where a node draws it.
 #[derive(Clone, Copy)]
-struct Made {
+pub(super) struct Made {
     /// Index of the scene's mesh.
     mesh: usize,
+    /// The mesh's largest coordinate, metres.
+    reach: f64,
     /// The translation from the mesh's space to the world, if a skin places the mesh.
     posed: Option<DVec3>,
     /// Index of what deforms the mesh, if a clip does.
@@ -76,14 +78,11 @@ impl Loader<'_> {
         let key = (mesh.value(), weights.iter().map(|w| w.to_bits()).collect());
         let made = match self.loaded.get(&key) {
             // Weights that change are the node's own.
-            Some(found) if morph.is_none() => {
-                let shared = |&mesh| Made { mesh, posed: None, deformed: None };
-                found.iter().map(shared).collect()
-            }
+            Some(found) if morph.is_none() => found.clone(),
             _ => {
                 let made = self.load_primitives(mesh, &deforming)?;
                 if morph.is_none() {
-                    self.loaded.insert(key, made.iter().map(|made| made.mesh).collect());
+                    self.loaded.insert(key, made.clone());
                 }
                 made
             }
@@ -120,7 +119,7 @@ impl Loader<'_> {
         stands: Option<Place>,
         place: &str,
     ) {
-        let Made { mesh, deformed, .. } = made;
+        let Made { mesh, reach, deformed, .. } = made;
         let instance = self.scene.instances.len();
         let is_carried =
             deformed.is_some() || stands.is_some_and(|s| matches!(s.anchor, Anchor::Moving(_)));
@@ -132,8 +131,7 @@ impl Loader<'_> {
             self.scene.instances.push(Instance { mesh, world_from_mesh });
             return;
         }
-        let rigid = || Shape::Rigid { reach: self.scene.meshes[mesh].reach() };
-        let shape = deformed.map_or_else(rigid, Shape::Deformed);
+        let shape = deformed.map_or(Shape::Rigid { reach }, Shape::Deformed);
         let carried = Carried { instance, place: stands, shape };
         let world = self.rigging.animations.world_from_mesh(&carried);
         let world_from_mesh = world.unwrap_or(ABSENT);
@@ -204,7 +202,7 @@ impl Loader<'_> {
         let world_from_bind = joints.map(|joints| self.rigging.world_from_bind(joints));
         let world_from_bind = world_from_bind.unwrap_or_default();
         let out_of_range = || document.invalid(place, "the pose moves a vertex out of range");
-        let mut made = Made { mesh: index, posed: None, deformed: None };
+        let mut made = Made { mesh: index, reach: 0.0, posed: None, deformed: None };
         if is_deformed {
             let vertices = mesh.positions.len();
             let bytes = Deformer::bytes(vertices, &targets, influences.len());
@@ -224,6 +222,7 @@ impl Loader<'_> {
             let origin = animation::skin(&mut mesh, &influences, &world_from_bind);
             made.posed = Some(origin.ok_or_else(out_of_range)?);
         }
+        made.reach = mesh.reach();
         self.scene.meshes.push(mesh);
         Ok(made)
     }
