@@ -10,8 +10,8 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 /// Lists of instances to draw, one after the other.
 pub(crate) struct Instances {
-    /// All instances of the scene, in the order of [`Placed::instances`](crate::scene::Placed). Maps and picture
-    /// copy from here those that they draw.
+    /// All instances of the scene, in the order of those in [`Placed`](crate::scene::Placed). Maps
+    /// and picture copy from here those that they draw.
     all: Vec<CasterInstance>,
     /// World position of the origin that `all` is relative to, metres, and the version of the
     /// scene's instances; `None` before the first frame.

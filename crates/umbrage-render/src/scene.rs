@@ -15,8 +15,8 @@ use wgpu::{
     VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode,
 };
 
-/// The meshes and materials of a scene on a GPU, in the pose that it had when it was uploaded or that
-/// was [set](Self::pose) last.
+/// The meshes and materials of a scene on a GPU, in the pose that was [set](Self::pose) last, or
+/// that the scene had when it was uploaded.
 pub struct SceneBuffers {
     pub(crate) positions: Buffer,
     pub(crate) attributes: Buffer,
@@ -198,9 +198,9 @@ impl SceneBuffers {
     /// Moves instances and deforms meshes as `moved` tells of the scene that was uploaded, which
     /// has been [posed](Scene::pose) since. What is drawn from now on shows the new pose. Returns
     /// boxes around the casters that changed, before and after, world space, metres: pass them to
-    /// the next [`Renderer::draw_maps`](crate::Renderer::draw_maps) as
-    /// [`Casters::MovedIn`](umbrage_wgpu::Casters::MovedIn), of each renderer. The boxes of several
-    /// poses between two draws count together.
+    /// the next [`Renderer::draw_maps`](crate::Renderer::draw_maps) of each renderer, as
+    /// [`Casters::MovedIn`](umbrage_wgpu::Casters::MovedIn). What every pose moved must be passed
+    /// on, and the boxes of several poses between two draws count together.
     ///
     /// # Errors
     /// The scene is not the one that was uploaded, or the device refused something.

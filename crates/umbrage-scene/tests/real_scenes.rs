@@ -104,3 +104,32 @@ fn figures_stand_in_their_bind_pose() {
     let fox = scene("characters/Fox.glb");
     assert!(fox.notices.iter().any(|n| n.0.contains("no normals")), "{:?}", fox.notices);
 }
+
+/// Characters walk within a box that is little larger than that of their rest, and come back.
+#[needs(scenes)]
+#[test]
+fn characters_move_and_come_to_rest() {
+    for (file, clips) in [
+        ("characters/CesiumMan.glb", &[("animation0", 2.0)][..]),
+        ("characters/Fox.glb", &[("Survey", 3.416), ("Walk", 0.708), ("Run", 1.158)]),
+    ] {
+        let mut s = scene(file);
+        let rest = s.meshes[0].positions.clone();
+        let size = s.bounds().size().length();
+        let found: Vec<(String, f64)> =
+            s.animations.clips().iter().map(|c| (c.name.clone(), c.duration_s)).collect();
+        assert_eq!(found.len(), clips.len(), "{file}: {found:?}");
+        for (i, ((found, duration_s), &(name, expected_s))) in found.iter().zip(clips).enumerate() {
+            assert_eq!(found, name, "{file}");
+            assert!((duration_s - expected_s).abs() < 1e-3, "{file}: {name} takes {duration_s} s");
+            for share in [0.0, 0.3, 0.8, 1.0] {
+                assert_eq!(s.pose(Some(i), share * duration_s).meshes, [0], "{file}: {name}");
+                let posed = s.bounds().size().length();
+                assert!((0.8..1.3).contains(&(posed / size)), "{file}: {name}: {posed} of {size}");
+                assert!(s.meshes[0].positions != rest, "{file}: {name}");
+            }
+        }
+        s.pose(None, 0.0);
+        assert_eq!(s.meshes[0].positions, rest, "{file}");
+    }
+}

@@ -291,6 +291,7 @@ fn info_tells_what_is_there() {
     let desk = Desk::new();
     let found = info(&desk, "lamps:3", &[]);
     let expected = [
+        "animations",
         "bounds",
         "cameras",
         "instances",
@@ -362,6 +363,57 @@ fn ground_lies_under_a_model() {
         image.pixels().filter(|p| p.0[0] == 0).count()
     };
     assert!(shadows(&["--ground"]) > shadows(&[]) + 50);
+}
+
+/// A still of an animation is planned, rendered and told of as a scene that stands so.
+#[test]
+fn animations_pose_scenes() {
+    let desk = Desk::new();
+    let floor = ("Floor", [0.0, -3.0, 0.0], [20.0, 1.0, 20.0]);
+    let at = |x: f64| [floor, ("Model", [x, -1.0, -1.0], [1.0, 1.0, 1.0])];
+    // The keys are numbers of the corners: at -1 s and 1 s, from (-1, -1, -1) to (1, -1, -1).
+    let accessor = |offset: u64, kind: &str, count: u64| {
+        json!({"bufferView": 0, "byteOffset": offset, "componentType": 5126, "count": count,
+               "type": kind})
+    };
+    let indices = json!({"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"});
+    let more = json!({
+        "accessors": [accessor(0, "VEC3", 8), indices, accessor(8, "SCALAR", 2),
+                      accessor(0, "VEC3", 2)],
+        "animations": [{
+            "name": "Slide", "samplers": [{"input": 2, "output": 3}],
+            "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}],
+        }],
+    });
+    write(&desk, "moving.gltf", &at(9.0), &more);
+    write(&desk, "rest.gltf", &at(9.0), &json!({}));
+    write(&desk, "half.gltf", &at(0.5), &json!({}));
+    let found = info(&desk, "moving.gltf", &[]);
+    assert_eq!(found["animations"], json!([{"words": ["Slide", "#1"], "duration": 1.0}]));
+    assert!(desk.run(&["info", "moving.gltf"]).stdout.contains("animation   Slide or #1: 1 s"));
+    assert_eq!(info(&desk, "rest.gltf", &[])["animations"], json!([]));
+    let half = ["--animation", "Slide", "--time", "0.5"];
+    for aov in ["normal", "truth", "visibility"] {
+        let of = |scene: &str, options: &[&str]| picture(&desk, scene, aov, options);
+        assert_eq!(of("moving.gltf", &half), of("half.gltf", &[]), "{aov}");
+        assert_eq!(of("moving.gltf", &[]), of("rest.gltf", &[]), "{aov}");
+        assert_ne!(of("moving.gltf", &["--animation=#1"]), of("half.gltf", &[]), "{aov}");
+    }
+    for (options, expected) in [
+        (
+            ["--animation", "Slyde", ""],
+            "--animation: the scene has no animation `Slyde`; there are Slide or #1",
+        ),
+        (["--animation", "#2", ""], "--animation: the scene has no animation `#2`"),
+        (["--animation", "Slide", "--time=-1"], "must be a number of seconds, at least 0"),
+        (["--animation", "Slide", "--time=nan"], "must be a number of seconds, at least 0"),
+        (["--time", "1", ""], "--animation"),
+    ] {
+        let options = options.into_iter().filter(|o| !o.is_empty());
+        let args: Vec<&str> = ["plan", "moving.gltf"].into_iter().chain(options).collect();
+        refuses(&desk, &args, expected);
+    }
+    refuses(&desk, &["info", "pole", "--animation", "x"], "no animation `x`, nor any other");
 }
 
 #[test]

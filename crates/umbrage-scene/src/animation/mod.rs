@@ -203,17 +203,24 @@ pub(crate) struct Deformed {
 pub(crate) struct Carried {
     /// Index into [`Scene::instances`].
     pub(crate) instance: usize,
-    pub(crate) place: Place,
+    /// `None` if the skin of its mesh places it.
+    pub(crate) place: Option<Place>,
     pub(crate) shape: Shape,
 }
 
-/// Where a carried instance stands.
+/// The node where an instance stands.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Place {
-    /// At a node, or at a copy of what the node draws.
-    Node { anchor: Anchor, node_from_copy: Option<DAffine3> },
-    /// Where the skin of its mesh has it.
-    Skin,
+pub(crate) struct Place {
+    pub(crate) anchor: Anchor,
+    /// If the node draws copies, where this one is.
+    pub(crate) node_from_copy: Option<DAffine3>,
+}
+
+impl Place {
+    pub(crate) fn world(&self, nodes: &[Node]) -> DAffine3 {
+        let world = self.anchor.world(nodes);
+        self.node_from_copy.map_or(world, |copy| world * copy)
+    }
 }
 
 /// The mesh of a carried instance.
@@ -295,11 +302,8 @@ impl Animations {
 
     /// Whether the last pose may have changed a carried instance.
     fn is_moved(&self, carried: &Carried) -> bool {
-        let stands_elsewhere = match carried.place {
-            Place::Node { anchor, .. } => anchor.is_moved(&self.nodes),
-            Place::Skin => false,
-        };
-        stands_elsewhere || matches!(carried.shape, Shape::Deformed(i) if self.deformed[i].is_moved)
+        carried.place.is_some_and(|place| place.anchor.is_moved(&self.nodes))
+            || matches!(carried.shape, Shape::Deformed(i) if self.deformed[i].is_moved)
     }
 
     /// The transform of a carried instance in the present pose; `None` if the instance cannot be
@@ -309,13 +313,8 @@ impl Animations {
             Shape::Rigid { reach } => (DVec3::ZERO, reach),
             Shape::Deformed(i) => (self.deformed[i].origin?, self.deformed[i].reach),
         };
-        let world = match carried.place {
-            Place::Node { anchor, node_from_copy } => {
-                let world = anchor.world(&self.nodes);
-                node_from_copy.map_or(world, |copy| world * copy)
-            }
-            Place::Skin => DAffine3::from_translation(origin),
-        };
+        let posed = || DAffine3::from_translation(origin);
+        let world = carried.place.map_or_else(posed, |place| place.world(&self.nodes));
         let m = world.matrix3;
         let columns = m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs();
         let farthest = (world.translation.abs() + columns * reach).max_element();

@@ -29,9 +29,11 @@ struct Deforming<'a> {
 
 /// A primitive of a mesh where a node draws it.
 #[derive(Clone, Copy)]
-struct Made {
+pub(super) struct Made {
     /// Index of the scene's mesh.
     mesh: usize,
+    /// The mesh's largest coordinate, metres.
+    reach: f64,
     /// The translation from the mesh's space to the world, if a skin places the mesh.
     posed: Option<DVec3>,
     /// Index of what deforms the mesh, if a clip does.
@@ -63,13 +65,10 @@ impl Loader<'_> {
             let made = self.load_primitives(mesh, &deforming)?;
             self.grow_instances(&place, made.len() as u64)?;
             for made in made {
-                let stands = match made.posed {
-                    Some(_) => Place::Skin,
-                    None => {
-                        let anchor = Anchor::Fixed(DAffine3::IDENTITY);
-                        Place::Node { anchor, node_from_copy: None }
-                    }
-                };
+                // Without joints of its own, a primitive stays where it is.
+                let unmoved =
+                    Place { anchor: Anchor::Fixed(DAffine3::IDENTITY), node_from_copy: None };
+                let stands = made.posed.is_none().then_some(unmoved);
                 let origin = made.posed.unwrap_or(DVec3::ZERO);
                 self.add_instance(made, DAffine3::from_translation(origin), stands, &place);
             }
@@ -79,14 +78,11 @@ impl Loader<'_> {
         let key = (mesh.value(), weights.iter().map(|w| w.to_bits()).collect());
         let made = match self.loaded.get(&key) {
             // Weights that change are the node's own.
-            Some(found) if morph.is_none() => {
-                let shared = |&mesh| Made { mesh, posed: None, deformed: None };
-                found.iter().map(shared).collect()
-            }
+            Some(found) if morph.is_none() => found.clone(),
             _ => {
                 let made = self.load_primitives(mesh, &deforming)?;
                 if morph.is_none() {
-                    self.loaded.insert(key, made.iter().map(|made| made.mesh).collect());
+                    self.loaded.insert(key, made.clone());
                 }
                 made
             }
@@ -96,15 +92,14 @@ impl Loader<'_> {
         let taken = document.budget.taken();
         let load = |count| Copies::load(document, node, &place, count as usize);
         let copies = count.map(load).transpose()?;
-        let world_from_node = self.hierarchy.world_from_node[index];
-        let anchor = self.rigging.anchor(index).unwrap_or(Anchor::Fixed(world_from_node));
+        let anchor = self.rigging.anchor_of(index);
         for i in 0..count.unwrap_or(1) as usize {
             let copies = copies.as_ref();
             let node_from_copy = copies.map(|c| c.node_from_copy(document, i)).transpose()?;
-            let world_from_mesh = node_from_copy.map_or(world_from_node, |c| world_from_node * c);
-            let stands = Place::Node { anchor, node_from_copy };
+            let stands = Place { anchor, node_from_copy };
+            let world_from_mesh = stands.world(&self.rigging.animations.nodes);
             for &made in &made {
-                self.add_instance(made, world_from_mesh, stands, &place);
+                self.add_instance(made, world_from_mesh, Some(stands), &place);
             }
         }
         document.budget.give_back_to(taken);
@@ -117,11 +112,17 @@ impl Loader<'_> {
     }
 
     /// Adds an instance. If its transform is flat, it is left out, or absent if a clip moves it.
-    fn add_instance(&mut self, made: Made, world_from_mesh: DAffine3, stands: Place, place: &str) {
-        let Made { mesh, deformed, .. } = made;
+    fn add_instance(
+        &mut self,
+        made: Made,
+        world_from_mesh: DAffine3,
+        stands: Option<Place>,
+        place: &str,
+    ) {
+        let Made { mesh, reach, deformed, .. } = made;
         let instance = self.scene.instances.len();
         let is_carried =
-            deformed.is_some() || matches!(stands, Place::Node { anchor: Anchor::Moving(_), .. });
+            deformed.is_some() || stands.is_some_and(|s| matches!(s.anchor, Anchor::Moving(_)));
         if !is_carried {
             if animation::is_flat(world_from_mesh.matrix3) {
                 self.notices.add(place, "its transform flattens its mesh, left out");
@@ -130,8 +131,7 @@ impl Loader<'_> {
             self.scene.instances.push(Instance { mesh, world_from_mesh });
             return;
         }
-        let rigid = || Shape::Rigid { reach: self.scene.meshes[mesh].reach() };
-        let shape = deformed.map_or_else(rigid, Shape::Deformed);
+        let shape = deformed.map_or(Shape::Rigid { reach }, Shape::Deformed);
         let carried = Carried { instance, place: stands, shape };
         let world = self.rigging.animations.world_from_mesh(&carried);
         let world_from_mesh = world.unwrap_or(ABSENT);
@@ -202,7 +202,7 @@ impl Loader<'_> {
         let world_from_bind = joints.map(|joints| self.rigging.world_from_bind(joints));
         let world_from_bind = world_from_bind.unwrap_or_default();
         let out_of_range = || document.invalid(place, "the pose moves a vertex out of range");
-        let mut made = Made { mesh: index, posed: None, deformed: None };
+        let mut made = Made { mesh: index, reach: 0.0, posed: None, deformed: None };
         if is_deformed {
             let vertices = mesh.positions.len();
             let bytes = Deformer::bytes(vertices, &targets, influences.len());
@@ -222,6 +222,7 @@ impl Loader<'_> {
             let origin = animation::skin(&mut mesh, &influences, &world_from_bind);
             made.posed = Some(origin.ok_or_else(out_of_range)?);
         }
+        made.reach = mesh.reach();
         self.scene.meshes.push(mesh);
         Ok(made)
     }

@@ -25,6 +25,7 @@ use gltf::json::extensions::scene::khr_lights_punctual::Type;
 use gltf::json::validation::Checked;
 use hierarchy::Hierarchy;
 use material::Materials;
+use meshes::Made;
 use rigging::Rigging;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -38,9 +39,9 @@ pub const SCENE_BYTES: u64 = 2 << 30;
 ///
 /// The file's default scene is loaded in the pose that its nodes have: skins and the default
 /// weights of morph targets are applied. [`Scene::pose`] plays its animations, of which what moves
-/// nodes and changes weights is read. The scene consists of triangles with
-/// base colour, `MASK` alpha (of factor, texture and vertices) and normals, of cameras, and of the
-/// lights of `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, including
+/// nodes and changes weights is read. The scene consists of triangles with base colour, `MASK`
+/// alpha (of factor, texture and vertices) and normals, of cameras, and of the lights of
+/// `KHR_lights_punctual`. Each primitive is stored once and drawn by instances, including
 /// those of `EXT_mesh_gpu_instancing`. Nodes that `KHR_node_visibility` hides are left out, with
 /// all below them but their cameras. Textures are PNG or JPEG images with the transform of
 /// `KHR_texture_transform`; they are interpolated as their sampler's `magFilter` says, without mip
@@ -62,7 +63,8 @@ pub const SCENE_BYTES: u64 = 2 << 30;
 /// - Spot light cones with half angles beyond 90°, which glTF does not allow, are narrowed to 90°.
 ///
 /// Vertex colours, emission, textures other than that of the base colour, scenes other than the
-/// default one and other extensions are not supported and are left out, also with a notice. Both sides of every surface show, whatever `doubleSided` says.
+/// default one and other extensions are not supported and are left out, also with a notice. Both
+/// sides of every surface show, whatever `doubleSided` says.
 ///
 /// # Errors
 /// The file cannot be read, is cut off, refers to files outside its folder or to pipes or devices,
@@ -75,7 +77,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 
 /// Like [`load`], with another limit of the memory that the scene may take, bytes. All count
 /// together: the files, their JSON, what is read from them for a while, and the scene's vertices,
-/// triangles, instances, pixels and animations. What cannot become large without these is not counted.
+/// triangles, instances, pixels and animations. What cannot become large without these is not
+/// counted.
 ///
 /// # Errors
 /// As for [`load`].
@@ -151,8 +154,8 @@ struct Loader<'a> {
     rigging: Rigging<'a>,
     materials: Materials,
     /// For each glTF mesh that has been loaded, and the bits of the weights that it was morphed by,
-    /// the indices of the scene meshes made from it.
-    loaded: HashMap<(usize, Vec<u32>), Vec<usize>>,
+    /// the scene's meshes made from it.
+    loaded: HashMap<(usize, Vec<u32>), Vec<Made>>,
     scene: Scene,
     notices: Notices,
 }

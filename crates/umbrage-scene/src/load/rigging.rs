@@ -179,12 +179,13 @@ impl<'a> Rigging<'a> {
         Ok(())
     }
 
-    /// What hangs on a node of the file hangs on; `None` if there is no such node.
+    /// What something at a node of the file hangs on; `None` if there is no such node.
     pub(super) fn anchor(&self, node: usize) -> Option<Anchor> {
         (node < self.moving.len()).then(|| self.anchor_of(node))
     }
 
-    fn anchor_of(&self, node: usize) -> Anchor {
+    /// The same for a node that there is.
+    pub(super) fn anchor_of(&self, node: usize) -> Anchor {
         match self.moving[node] {
             Some(moving) => Anchor::Moving(moving),
             None => Anchor::Fixed(self.hierarchy.world_from_node[node]),
