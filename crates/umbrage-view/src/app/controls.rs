@@ -147,7 +147,7 @@ impl App<'_> {
                     false => ui.visuals().strong_text_color(),
                 };
                 ui.label(RichText::new(&message.text).color(color));
-                is_closed = ui.small_button("✕").tip("Take this message away (Escape).").clicked();
+                is_closed = ui.small_button("×").tip("Take this message away (Escape).").clicked();
                 ui.separator();
                 context.request_repaint_after_secs(1.0);
             }

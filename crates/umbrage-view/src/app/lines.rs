@@ -13,8 +13,15 @@ pub(super) const BODY: Color32 = Color32::from_rgb(90, 220, 120);
 
 /// A line in the world, and what it belongs to.
 pub(super) struct Line {
-    pub(super) ends: [DVec3; 2],
-    pub(super) color: Color32,
+    ends: [DVec3; 2],
+    color: Color32,
+}
+
+impl Line {
+    /// Body B has many edges, which should not hide the others.
+    fn stroke(&self) -> Stroke {
+        Stroke::new(if self.color == BODY { 1.0 } else { 2.0 }, self.color)
+    }
 }
 
 /// The lines of a frame: the frustum V of the camera that maps were planned for, body B, and for
@@ -86,7 +93,7 @@ pub(super) fn paint_in_world(painter: &Painter, rect: Rect, camera: &Camera, lin
         let at = |p: DVec2| {
             rect.min + vec2(p.x as f32 / width * rect.width(), p.y as f32 / height * rect.height())
         };
-        painter.line_segment(ends.map(at), Stroke::new(1.5, line.color));
+        painter.line_segment(ends.map(at), line.stroke());
     }
 }
 
@@ -135,7 +142,7 @@ pub(super) fn paint_from_light(
         rect.center() + vec2(p.x as f32, p.y as f32)
     };
     for line in lines {
-        painter.line_segment(line.ends.map(at), Stroke::new(1.5, line.color));
+        painter.line_segment(line.ends.map(at), line.stroke());
     }
 }
 

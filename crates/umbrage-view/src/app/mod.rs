@@ -93,6 +93,7 @@ pub(crate) struct App<'k> {
     drafts: [technique::Draft; 2],
     /// The picture's area, as egui knows it.
     picture_id: Option<egui::Id>,
+    picture_rect: egui::Rect,
     /// The point under the mouse: its distance along the view, metres.
     mouse_depth: Option<f64>,
     /// Size of the picture's area, pixels.
@@ -129,6 +130,7 @@ impl<'k> App<'k> {
             job: None,
             drafts,
             picture_id: None,
+            picture_rect: egui::Rect::ZERO,
             mouse_depth: None,
             image: [1, 1],
             last_tick: Instant::now(),
@@ -206,7 +208,7 @@ impl<'k> App<'k> {
                 News::Truth(truth) => self.judged.begin(truth),
                 News::TruthGrew => self.judged.is_stale = true,
                 News::Visibility(visibility) => self.judged.add(visibility),
-                News::Refused(problem) => self.complain(format!("the device refused: {problem}")),
+                News::Refused(problem) => self.refused(problem),
                 News::Job(what, share) => self.job = Some((what, share)),
                 News::Measured(measurement) => self.presets.add(measurement),
                 News::JobDone(done) => {
@@ -218,6 +220,18 @@ impl<'k> App<'k> {
                 }
             }
         }
+    }
+
+    fn refused(&mut self, problem: String) {
+        // The window's surface cannot be resized while a thread of the stage submits work. egui
+        // tries again with the next frame.
+        if problem.contains("Surface::configure") {
+            return log::debug!("{problem}");
+        }
+        if self.kept.driver.is_some() {
+            self.kept.outcome = Outcome::Failed(problem.clone());
+        }
+        self.complain(problem);
     }
 
     fn opened(&mut self, info: Arc<SceneInfo>) {

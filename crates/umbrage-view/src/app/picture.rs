@@ -29,6 +29,7 @@ impl App<'_> {
                 .tip_beside(
                     "Drag to turn, right-drag to move, scroll to go nearer; F1 lists the keys.",
                 );
+            self.picture_rect = rect;
             self.note_size(ui, rect);
             self.mouse(ui, &response, rect);
             let painter = ui.painter_at(rect);

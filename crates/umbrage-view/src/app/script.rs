@@ -78,6 +78,11 @@ impl App<'_> {
     pub(super) fn drive(&mut self, context: &Context) {
         let Some(mut driver) = self.kept.driver.take() else { return };
         context.request_repaint_after_secs(0.02);
+        if let Outcome::Failed(_) = self.kept.outcome {
+            context.send_viewport_cmd(ViewportCommand::Close);
+            driver.steps.clear();
+            driver.rest = u32::MAX;
+        }
         while driver.is_ready() {
             let Some(step) = driver.steps.front().cloned() else {
                 self.kept.outcome = Outcome::Closed;

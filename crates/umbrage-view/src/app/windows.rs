@@ -20,14 +20,17 @@ const DEPTHS: u32 = 128;
 impl App<'_> {
     /// Shows the windows that are open.
     pub(super) fn windows(&mut self, context: &egui::Context) {
-        for (panel, title, _) in Panel::ALL {
+        for (i, (panel, title, _)) in Panel::ALL.into_iter().enumerate() {
             if panel == Panel::Controls || !self.is_shown(panel) {
                 continue;
             }
             let mut is_open = true;
             let most = context.content_rect().size() - vec2(24.0, 80.0);
             let width = f32::min(440.0, most.x.max(120.0));
+            // The windows begin at the right of the picture, each a little below the one before.
+            let corner = self.picture_rect.right_top() + vec2(-width - 24.0, 4.0 + 20.0 * i as f32);
             Window::new(title)
+                .default_pos(corner.max(egui::pos2(4.0, self.picture_rect.top())))
                 .id(egui::Id::unique(title))
                 .open(&mut is_open)
                 .default_width(width)
