@@ -29,8 +29,8 @@ pub(crate) enum Action {
     LightSize(Option<LightSize>),
     /// A camera of the scene, by the word that chooses it.
     Camera(String),
-    Eye(DVec3),
-    Target(DVec3),
+    /// The eye, and the point that it looks at, metres.
+    Stand([DVec3; 2]),
     /// Vertical field of view, degrees.
     Fov(f64),
     /// Orthographic view of this height, metres.
@@ -152,8 +152,10 @@ impl Action {
                 Self::LightSize(Some(size))
             }
             "camera" => Self::Camera(text()?),
-            "eye" => Self::Eye(numbers(verb, rest)?.into()),
-            "target" => Self::Target(numbers(verb, rest)?.into()),
+            "stand" => {
+                let [x, y, z, to_x, to_y, to_z] = numbers(verb, rest)?;
+                Self::Stand([DVec3::new(x, y, z), DVec3::new(to_x, to_y, to_z)])
+            }
             "fov" => Self::Fov(numbers::<1>(verb, rest)?[0]),
             "ortho" => Self::Ortho(numbers::<1>(verb, rest)?[0]),
             "reset" => Self::Reset,
@@ -245,7 +247,8 @@ mod tests {
         assert_eq!(parse("compare side by side"), Action::Compare(Compare::Beside));
         assert_eq!(parse("panel shadow map off"), Action::Panel(Panel::Map, false));
         assert_eq!(parse("panel theory on"), Action::Panel(Panel::Theory, true));
-        assert_eq!(parse(" eye 1, 2,-3e2 "), Action::Eye(DVec3::new(1.0, 2.0, -300.0)));
+        let eye = DVec3::new(1.0, 2.0, -300.0);
+        assert_eq!(parse(" stand 1, 2,-3e2 0 0 0 "), Action::Stand([eye, DVec3::ZERO]));
         assert_eq!(parse("turntable 36 my turn"), Action::Turntable(36, "my turn".into()));
         assert_eq!(parse("light-size 0.5deg"), Action::LightSize(Some(LightSize::Degrees(0.5))));
         assert_eq!(parse("reset"), Action::Reset);
@@ -258,7 +261,7 @@ mod tests {
         assert_eq!(error("open"), "`open` needs a value");
         assert_eq!(error("sun 1"), "`sun` needs 2 numbers, not `1`");
         assert_eq!(error("hour nan"), "`hour` needs 1 number, not `nan`");
-        assert!(error("overlay rainbow").contains("error, grid, maps"));
+        assert!(error("overlay rainbow").contains("error, texels, partition"));
         assert!(error("freeze maybe").contains("on, off"));
         assert!(error("turntable 0 x").contains("1 to 3600"));
     }

@@ -17,8 +17,19 @@ pub(crate) struct ToOpen {
     pub(crate) light: LightOptions,
     /// The word of an animation, and the time in it, seconds.
     pub(crate) clip: Option<(String, f64)>,
-    /// Whether the settings have a view and a light already.
-    pub(crate) has_view: bool,
+    /// What of the settings is kept.
+    pub(crate) kind: Kind,
+}
+
+/// What is opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A scene, in its own view and light. Whatever else is set when it is there stays.
+    Scene,
+    /// A session, which sets everything.
+    Session,
+    /// The window as it was before its device was lost.
+    Again,
 }
 
 impl ToOpen {
@@ -34,7 +45,7 @@ impl ToOpen {
             ..settings.clone()
         };
         let (view, light) = (ViewOptions::default(), LightOptions::default());
-        Self { settings, view, light, clip: None, has_view: false }
+        Self { settings, view, light, clip: None, kind: Kind::Scene }
     }
 
     /// A session that was read.
@@ -56,6 +67,7 @@ impl ToOpen {
             techniques[1] = TRUTH.to_owned();
         }
         let mut to_open = Self::scene(&session.scene, settings);
+        to_open.kind = Kind::Session;
         to_open.settings = Settings {
             // The window poses the scene itself.
             changes: SceneOptions { animation: None, time_s: 0.0, ..session.changes.clone() },

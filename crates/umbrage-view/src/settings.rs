@@ -92,8 +92,8 @@ pub(crate) enum OverlayKind {
     #[default]
     None,
     Error,
-    Grid,
-    Maps,
+    Texels,
+    Partition,
     Difference,
 }
 
@@ -101,8 +101,8 @@ impl OverlayKind {
     pub(crate) const ALL: [(Self, &'static str, &'static str); 5] = [
         (Self::None, "none", "Show the plain pictures."),
         (Self::Error, "error", "Show how many pixels wide a texel is: above 1, edges are jagged."),
-        (Self::Grid, "grid", "Show every fifth line of the texels' grid on the surfaces."),
-        (Self::Maps, "maps", "Tint each surface by the map that serves it."),
+        (Self::Texels, "texels", "Show every fifth line of the texels' grid on the surfaces."),
+        (Self::Partition, "partition", "Tint each surface by the map that serves it."),
         (Self::Difference, "difference", "Show false light and false shadow, once the view rests."),
     ];
 
@@ -110,8 +110,8 @@ impl OverlayKind {
         match self {
             Self::None | Self::Difference => None,
             Self::Error => Some(Overlay::Error),
-            Self::Grid => Some(Overlay::Grid),
-            Self::Maps => Some(Overlay::Maps),
+            Self::Texels => Some(Overlay::Texels),
+            Self::Partition => Some(Overlay::Partition),
         }
     }
 }

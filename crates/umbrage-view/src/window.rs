@@ -10,6 +10,7 @@ use egui::ViewportBuilder;
 use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 use umbrage_render::Gpu;
 
 /// What a window begins with.
@@ -76,6 +77,7 @@ pub fn run(options: &Options) -> Result<(), Error> {
         message,
         driver: script,
         outcome: Outcome::Closed,
+        began: Some(Instant::now()),
         to_open,
     };
     for _ in 0..=MOST_LOSSES {

@@ -9,14 +9,14 @@ use std::path::PathBuf;
 Drag to turn, scroll to go nearer, Alt and drag to move the sun; F1 lists the keys. Scenes and
 sessions can also be dropped onto the window.
 
-A script has an action a line, such as `open town`, `technique lispsm:pcf3`, `overlay error`,
-`orbit 30 5`, `wait ready`, `wait truth`, `shoot NAME`.
+A script has a JSON object a line, each with one key: load, shadows, compare, camera, sun, overlay,
+size, wait, screenshot, quit; or do, for all else (docs/program.md lists the words).
 
 Examples:
   umbrage view
   umbrage view level.glb
   umbrage view umbrage-session.json
-  umbrage view town --script tour.txt --screenshot pictures")]
+  umbrage view town --script tour.jsonl --screenshot pictures")]
 pub(crate) struct Window {
     /// A built-in scene, or the path of a .gltf, .glb or session file.
     #[arg(value_name = "SCENE", default_value = "town")]

@@ -2,6 +2,7 @@
 
 use super::{App, technique::Draft};
 use crate::action::{Action, Copied, Panel, Theme};
+use crate::pose::Pose;
 use crate::session::to_open;
 use crate::settings::{LightSetting, TRUTH};
 use crate::stage::Job;
@@ -76,13 +77,15 @@ impl App<'_> {
                 };
                 settings.look_from(Some(name.clone()), view);
             }
-            Action::Eye(eye) => {
+            Action::Stand([eye, target]) => {
+                for position in [eye, target] {
+                    umbrage_lab::values::position(position)?;
+                }
+                if eye == target {
+                    return Err("the eye must not be at the target".into());
+                }
+                settings.pose = Pose::new(eye, target, settings.pose.up);
                 settings.moved();
-                settings.pose.eye = eye;
-            }
-            Action::Target(target) => {
-                settings.moved();
-                settings.pose.target = target;
             }
             Action::Fov(degrees) => {
                 let degrees = umbrage_lab::values::opening(degrees)?;

@@ -28,7 +28,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("W A S D Q E", "walk; with shift faster"),
     ("arrows", "turn, while the picture has the focus (Tab)"),
     ("shift and arrows", "move the sun, likewise"),
-    ("1 … 5", "overlays: none, error, grid, maps, difference"),
+    ("1 … 5", "overlays: none, error, texels, partition, difference"),
     ("O / C", "next overlay / next way to compare"),
     ("X / hold B", "swap the two techniques / the second while flipping"),
     ("V", "orbit or fly"),

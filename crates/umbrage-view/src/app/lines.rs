@@ -174,8 +174,8 @@ pub(super) fn paint_legend(painter: &Painter, rect: Rect, overlay: OverlayKind, 
     let rows: Vec<(Color32, String)> = match overlay {
         OverlayKind::None => return,
         OverlayKind::Error => return paint_scale(painter, rect),
-        OverlayKind::Grid => vec![(color(FALSE_LIGHT), "a line every 5 texels".into())],
-        OverlayKind::Maps => {
+        OverlayKind::Texels => vec![(color(FALSE_LIGHT), "a line every 5 texels".into())],
+        OverlayKind::Partition => {
             let maps = plan.maps.iter().enumerate().filter(|(_, map)| !map.is_empty());
             maps.map(|(i, map)| (map_color(i), map_name(map))).take(12).collect()
         }

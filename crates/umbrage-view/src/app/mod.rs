@@ -14,7 +14,7 @@ mod windows;
 
 use crate::Outcome;
 use crate::action::Panel;
-use crate::session::ToOpen;
+use crate::session::{Kind, ToOpen};
 use crate::settings::{LightSetting, Settings};
 use crate::stage::{Frame, Job, News, Request, SceneInfo, SceneToOpen, Stage};
 use egui::Ui;
@@ -41,6 +41,8 @@ pub(crate) struct Kept {
     pub(crate) driver: Option<Driver>,
     /// What the window's life came to.
     pub(crate) outcome: Outcome,
+    /// When the window was asked for, until it is open.
+    pub(crate) began: Option<Instant>,
     /// What to open at the beginning.
     pub(crate) to_open: Option<ToOpen>,
 }
@@ -99,6 +101,8 @@ pub(crate) struct App<'k> {
     /// Size of the picture's area, pixels.
     image: [u32; 2],
     last_tick: Instant,
+    /// When the window was asked for, until its first picture is drawn.
+    first_picture: Option<Instant>,
     /// The text in the field for a scene's name or path.
     path: String,
 }
@@ -134,6 +138,7 @@ impl<'k> App<'k> {
             mouse_depth: None,
             image: [1, 1],
             last_tick: Instant::now(),
+            first_picture: None,
             path,
         };
         app.apply_look(context);
@@ -235,16 +240,19 @@ impl<'k> App<'k> {
     }
 
     fn opened(&mut self, info: Arc<SceneInfo>) {
-        let Some((ToOpen { mut settings, view, clip, has_view, .. }, ..)) = self.opening.take()
-        else {
-            return;
-        };
-        if !has_view {
+        let Some((to_open, ..)) = self.opening.take() else { return };
+        let ToOpen { mut settings, view, clip, kind, .. } = to_open;
+        if kind == Kind::Scene {
+            let changes = settings.changes;
+            settings = ToOpen::scene(&settings.scene, &self.kept.settings).settings;
+            settings.changes = changes;
+        }
+        if kind != Kind::Again {
             let is_headlight = settings.light == LightSetting::Headlight;
             settings.begin_with(&info);
             settings.near = view.near.or(settings.near);
             settings.far = view.far.or(settings.far);
-            if is_headlight {
+            if kind == Kind::Session && is_headlight {
                 settings.light = LightSetting::Headlight;
             }
         }
@@ -271,6 +279,9 @@ impl<'k> App<'k> {
     }
 
     fn take_frame(&mut self, frame: Arc<Frame>) {
+        if let Some(began) = self.first_picture.take() {
+            log::info!("the first picture is drawn after {:.2?}", began.elapsed());
+        }
         self.textures.show(&frame);
         self.history.add(&frame);
         let failed = frame.pictures.iter().find_map(|p| p.drawn.as_ref().err().map(|e| (p, e)));
@@ -317,10 +328,10 @@ impl<'k> App<'k> {
             let words = problem.split_whitespace().collect::<Vec<_>>().join(" ");
             self.complain(format!("the GPU was lost ({words}) and has been opened again"));
             let settings = self.kept.settings.clone();
-            let has_view = self.info.is_some();
-            let again = ToOpen { has_view, ..ToOpen::scene(&settings.scene, &settings) };
+            let again = ToOpen::scene(&settings.scene, &settings);
+            let kind = if self.info.is_some() { Kind::Again } else { Kind::Scene };
             let opening = self.opening.take().map(|(to_open, ..)| to_open);
-            self.kept.to_open = Some(opening.unwrap_or(ToOpen { settings, ..again }));
+            self.kept.to_open = Some(opening.unwrap_or(ToOpen { settings, kind, ..again }));
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         true
@@ -353,6 +364,10 @@ impl eframe::App for App<'_> {
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         if self.kept.outcome == Outcome::DeviceLost {
             return;
+        }
+        if let Some(began) = self.kept.began.take() {
+            log::info!("the window is open after {:.2?}", began.elapsed());
+            self.first_picture = Some(began);
         }
         let seconds = self.tick();
         self.play(ui.ctx(), seconds);

@@ -7,7 +7,7 @@ use crate::action::Action;
 use crate::script::{Command, Step, Wait};
 use egui::{Context, Event, PointerButton, Pos2, RawInput, ViewportCommand, vec2};
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -18,12 +18,16 @@ pub(crate) struct Driver {
     folder: PathBuf,
     /// When the present step began, and the number of frames at that time.
     began: Option<(Instant, u64)>,
+    /// Frames of the window since the present step began.
+    shown: u64,
     /// Events for the next frames of the window.
     events: VecDeque<Vec<Event>>,
     /// A picture of the window that is on its way.
     shot: Option<Shot>,
     /// Memory in use when it was last noted.
     memory: Option<Memory>,
+    /// Whether the present step has begun to open something.
+    is_loading: bool,
     /// Frames of the window in which nothing must happen, so that it can settle.
     rest: u32,
 }
@@ -53,9 +57,11 @@ impl Driver {
             steps: steps.into(),
             folder,
             began: None,
+            shown: 0,
             events: VecDeque::new(),
             shot: None,
             memory: None,
+            is_loading: false,
             rest: 0,
         }
     }
@@ -83,7 +89,9 @@ impl App<'_> {
             driver.steps.clear();
             driver.rest = u32::MAX;
         }
-        while driver.is_ready() {
+        // What is done while a scene is being opened would be lost.
+        let is_waiting = self.opening.is_some() && !driver.is_loading;
+        while driver.is_ready() && !is_waiting {
             let Some(step) = driver.steps.front().cloned() else {
                 self.kept.outcome = Outcome::Closed;
                 context.send_viewport_cmd(ViewportCommand::Close);
@@ -100,6 +108,7 @@ impl App<'_> {
                     log::info!("line {}: done in {:.2?}", step.line, began.0.elapsed());
                     driver.steps.pop_front();
                     driver.began = None;
+                    driver.shown = 0;
                 }
                 Done::Failed(problem) => {
                     self.kept.outcome = Outcome::Failed(format!("line {}: {problem}", step.line));
@@ -138,15 +147,21 @@ impl App<'_> {
                 self.act(context, action.clone());
                 driver.rest = 2;
                 let new = self.kept.message.as_ref().filter(|m| Some(m.since) != before);
-                match new.filter(|m| m.is_error && !matches!(action, Action::Open(_))) {
-                    Some(message) => return Done::Failed(message.text.clone()),
+                match new.filter(|m| m.is_error) {
+                    Some(message) => Done::Failed(message.text.clone()),
                     None => Done::Yes,
                 }
+            }
+            Command::Load(path, succeeds) => self.load(context, driver, path, *succeeds),
+            Command::Quit => {
+                driver.steps.clear();
+                Done::Yes
             }
             Command::Wait(wait) => {
                 let is_over = match *wait {
                     Wait::Time(time) => began.elapsed() >= time,
-                    Wait::Frames(count) => {
+                    Wait::Frames(count) => driver.shown >= count && self.is_up_to_date(),
+                    Wait::Turns(count) => {
                         if self.is_up_to_date() {
                             self.act(context, Action::Orbit([1.0, 0.0]));
                         }
@@ -224,7 +239,35 @@ impl App<'_> {
         }
     }
 
+    /// Opens a scene or session, and waits until that has succeeded or failed.
+    fn load(
+        &mut self,
+        context: &Context,
+        driver: &mut Driver,
+        path: &Path,
+        succeeds: bool,
+    ) -> Done {
+        if !std::mem::replace(&mut driver.is_loading, true) {
+            self.kept.message = None;
+            self.act(context, Action::Open(path.to_owned()));
+            return Done::NotYet;
+        }
+        if self.opening.is_some() {
+            return Done::NotYet;
+        }
+        driver.is_loading = false;
+        let problem = self.kept.message.as_ref().filter(|m| m.is_error).map(|m| m.text.clone());
+        match (problem, succeeds) {
+            (Some(problem), true) => Done::Failed(problem),
+            (None, false) => Done::Failed(format!("{} was opened", path.display())),
+            _ => Done::Yes,
+        }
+    }
+
     fn shoot(&mut self, context: &Context, driver: &mut Driver, name: &str) -> Done {
+        if driver.shot.is_none() && !self.is_up_to_date() {
+            return Done::NotYet;
+        }
         let Some(shot) = driver.shot.as_ref().filter(|shot| shot.name == name) else {
             let image = Arc::new(Mutex::new(None));
             let taken = Arc::clone(&image);
@@ -277,6 +320,7 @@ impl App<'_> {
     pub(super) fn script_input(&mut self, input: &mut RawInput) {
         let Some(driver) = &mut self.kept.driver else { return };
         driver.rest = driver.rest.saturating_sub(1);
+        driver.shown += 1;
         if let Some(events) = driver.events.pop_front() {
             input.events.extend(events);
             if driver.events.is_empty() {

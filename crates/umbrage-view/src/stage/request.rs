@@ -47,9 +47,9 @@ pub(crate) enum Overlay {
     /// Pixels per texel, in colours.
     Error,
     /// The texels' grid.
-    Grid,
+    Texels,
     /// A tint for each map.
-    Maps,
+    Partition,
 }
 
 impl Overlay {
@@ -68,8 +68,8 @@ impl Overlay {
                 let max = ErrorScale::default().max();
                 umbrage_render::Overlay::Error { colors: &ERRORS, max }
             }
-            Self::Grid => umbrage_render::Overlay::Grid { color: FALSE_LIGHT },
-            Self::Maps => umbrage_render::Overlay::Partition { colors: &PARTITIONS },
+            Self::Texels => umbrage_render::Overlay::Grid { color: FALSE_LIGHT },
+            Self::Partition => umbrage_render::Overlay::Partition { colors: &PARTITIONS },
         }
     }
 }
