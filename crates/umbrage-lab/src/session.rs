@@ -486,7 +486,8 @@ mod tests {
             "umbrage compare town:20 --shadows=adaptive+z4:pcss@2048 \
              --shadows='uniform(stable)+z4:pcf3' --without='a lamp' --eye=0.1,2,-1000000 \
              --target=0,1,0 --up=0,0,1 --fov=47.5 --near=0.25 --far=125 --size=640x360 \
-             --sun=-0.3,-1,0.1 --light-size=0.53deg --fit=seen --ground --opaque"
+             --sun=-0.3,-1,0.1 --light-size=0.53deg --animation=walk --time=1.25 \
+             --fit=seen --ground --opaque"
         );
     }
 }

@@ -103,7 +103,6 @@ fn sessions_that_are_none() {
         (with("shadows", json!(["lipsm"])), "did you mean `lispsm`?"),
         (with("scene", json!("nowhere.gltf")), "there is no file nowhere.gltf"),
         (with("time", json!(-1)), "--session: s.json: time: must"),
-        (with("animation", json!("walk")), "--animation: the scene has no animation `walk`"),
         (with("scene", json!("twon")), "did you mean `town`?"),
     ] {
         desk.write("s.json", &text);
@@ -114,6 +113,9 @@ fn sessions_that_are_none() {
     refuses(&desk, &["compare", "--session", "scenes"], "--session: scenes: ");
     refuses(&desk, &["compare", "town", "--session", "s.json"], "cannot be used with");
     refuses(&desk, &["compare"], "<SCENE>");
+    desk.write("sessions/a.json", &with("animation", json!("walk")));
+    let of_scene = ["plan", "--session", "sessions/a.json"];
+    refuses(&desk, &of_scene, "--animation: the scene has no animation `walk`");
     desk.write("s.json", &with("shadows", json!(["psm", "psm"])));
     refuses(&desk, &["compare", "--session", "s.json"], "`psm` is given twice");
 }
