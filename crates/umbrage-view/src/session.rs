@@ -2,6 +2,7 @@
 
 use crate::settings::{Compare, LightSetting, OverlayKind, Settings, TRUTH};
 use crate::stage::SceneInfo;
+use crate::sun::Sun;
 use std::path::Path;
 use umbrage_lab::{LightOptions, SceneOptions, Session, ViewOptions};
 use umbrage_scene::Lens;
@@ -128,7 +129,7 @@ impl Settings {
         };
         let light = match &self.light {
             LightSetting::Sun(_) | LightSetting::Hour(_) => {
-                LightOptions { sun: self.sun().map(|sun| sun.direction()), light: None }
+                LightOptions { sun: self.sun().map(Sun::direction), light: None }
             }
             LightSetting::Headlight => LightOptions::default(),
             LightSetting::Named(name) => LightOptions { sun: None, light: Some(name.clone()) },

@@ -246,7 +246,7 @@ impl App<'_> {
             held(Key::ArrowRight) - held(Key::ArrowLeft),
             held(Key::ArrowUp) - held(Key::ArrowDown),
         ];
-        let is_on_picture = context.memory(|m| m.focused()) == self.picture_id;
+        let is_on_picture = context.memory(egui::Memory::focused) == self.picture_id;
         if turn == [0.0; 2] || !is_on_picture {
             return;
         }

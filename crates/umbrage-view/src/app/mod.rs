@@ -322,6 +322,8 @@ impl<'k> App<'k> {
 
     /// Looks after the device. Gives whether the window must be opened again.
     fn is_lost(&mut self, context: &egui::Context) -> bool {
+        // Whether the device is lost may only show when it is asked. Errors show in the next check.
+        let _ = self.gpu.device().poll(wgpu::PollType::Poll);
         let Some(problem) = self.gpu.lost() else { return false };
         if self.kept.outcome != Outcome::DeviceLost {
             self.kept.outcome = Outcome::DeviceLost;
@@ -353,16 +355,15 @@ impl Message {
 
 impl eframe::App for App<'_> {
     fn logic(&mut self, context: &egui::Context, _: &mut eframe::Frame) {
-        if self.is_lost(context) {
-            return;
+        if !self.is_lost(context) {
+            self.take_news();
+            self.judged.count(&self.frame);
+            self.drive(context);
         }
-        self.take_news();
-        self.judged.count(&self.frame);
-        self.drive(context);
     }
 
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
-        if self.kept.outcome == Outcome::DeviceLost {
+        if self.is_lost(ui.ctx()) {
             return;
         }
         if let Some(began) = self.kept.began.take() {
@@ -379,6 +380,10 @@ impl eframe::App for App<'_> {
         self.windows(ui.ctx());
         self.ask();
         self.after_ui(ui.ctx());
+        if self.is_lost(ui.ctx()) {
+            // egui panics when it paints anything with a lost device.
+            ui.ctx().graphics_mut(|graphics| *graphics = Default::default());
+        }
     }
 
     fn raw_input_hook(&mut self, _: &egui::Context, input: &mut egui::RawInput) {

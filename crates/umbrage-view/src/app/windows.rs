@@ -8,7 +8,7 @@ use super::measured::History;
 use super::picture::drawn;
 use crate::action::{Action, Panel};
 use crate::stage::{Costs, Job};
-use egui::{Color32, ComboBox, Grid, RichText, Sense, Stroke, Ui, Window, vec2};
+use egui::{Color32, ComboBox, Grid, Pos2, Rect, RichText, Sense, Stroke, Ui, Window, vec2};
 use egui_plot::{Legend, Line, Plot, PlotPoints, Points, VLine};
 use glam::DVec2;
 use umbrage::{Camera, Light, Plan};
@@ -20,17 +20,16 @@ const DEPTHS: u32 = 128;
 impl App<'_> {
     /// Shows the windows that are open.
     pub(super) fn windows(&mut self, context: &egui::Context) {
-        for (i, (panel, title, _)) in Panel::ALL.into_iter().enumerate() {
+        for (panel, title, _) in Panel::ALL {
             if panel == Panel::Controls || !self.is_shown(panel) {
                 continue;
             }
             let mut is_open = true;
             let most = context.content_rect().size() - vec2(24.0, 80.0);
             let width = f32::min(440.0, most.x.max(120.0));
-            // The windows begin at the right of the picture, each a little below the one before.
-            let corner = self.picture_rect.right_top() + vec2(-width - 24.0, 4.0 + 20.0 * i as f32);
+            let at = first_place(panel, self.picture_rect, width);
             Window::new(title)
-                .default_pos(corner.max(egui::pos2(4.0, self.picture_rect.top())))
+                .default_pos(at)
                 .id(egui::Id::unique(title))
                 .open(&mut is_open)
                 .default_width(width)
@@ -277,7 +276,7 @@ impl App<'_> {
         let most = (ui.available_width() / w).min(380.0 / h);
         let (rect, response) = ui.allocate_exact_size(vec2(w * most, h * most), Sense::hover());
         response.on_hover_text("Depths as the light sees them: what is nearer to it is lighter.");
-        let whole = egui::Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
         ui.painter().image(shown.id, rect, whole, Color32::WHITE);
         let planned_for = frame.request.planned_for.unwrap_or(frame.request.camera);
         paint_in_map(ui.painter(), rect, map, &planned_for);
@@ -322,6 +321,17 @@ impl App<'_> {
         let job = Job::Measure { techniques, camera, light, light_size };
         self.begin("measuring", job);
     }
+}
+
+/// Where a window of this width is at first: in one of the picture's corners, so that windows which
+/// go together lie beside each other.
+fn first_place(panel: Panel, picture: Rect, width: f32) -> Pos2 {
+    let is_right = matches!(panel, Panel::Times | Panel::Theory | Panel::Map);
+    let is_low = matches!(panel, Panel::Map | Panel::LightSpace);
+    let x = if is_right { picture.right() - width - 24.0 } else { picture.left() + 8.0 };
+    // The picture's caption stays free.
+    let y = if is_low { picture.center().y - 40.0 } else { picture.top() + 52.0 };
+    Pos2::new(x.max(4.0), y)
 }
 
 /// The perspective errors m_s, m_t and the worst along the middle line of sight, by depth; `None`

@@ -7,7 +7,7 @@ use umbrage::{Aabb, Camera, Light, Plan};
 use umbrage_lab::{Fit, NamedTechnique};
 use umbrage_measure::{ErrorScale, FALSE_LIGHT, PARTITIONS, Rgb};
 use umbrage_render::{FrameTarget, SCALE_COLORS};
-use umbrage_scene::{Scene, SceneCamera};
+use umbrage_scene::SceneCamera;
 
 /// A frame that the window wants. Requests that are equal give equal frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -157,17 +157,5 @@ impl SceneInfo {
     pub(crate) fn words(choices: &umbrage_scene::Choices<'_>) -> Vec<String> {
         let word = |i| choices.words(i).into_iter().next().unwrap_or_else(|| format!("#{}", i + 1));
         (0..choices.len()).map(word).collect()
-    }
-
-    /// The words and values of a scene's cameras and lights.
-    pub(crate) fn cameras_and_lights(
-        scene: &Scene,
-    ) -> (Vec<(String, SceneCamera)>, Vec<(String, Light)>) {
-        let cameras = Self::words(&scene.camera_choices());
-        let lights = Self::words(&scene.light_choices());
-        (
-            cameras.into_iter().zip(scene.cameras.iter().cloned()).collect(),
-            lights.into_iter().zip(scene.lights.iter().map(|l| l.light)).collect(),
-        )
     }
 }

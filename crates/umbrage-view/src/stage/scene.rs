@@ -74,7 +74,8 @@ fn open_and_draw(
     stage("choosing a view")?;
     let chosen = choose_view(view, prepared.defaults()).map_err(|e| e.to_string())?;
     let chosen_light = choose_light(light, prepared.defaults()).map_err(|e| e.to_string())?;
-    let (cameras, lights) = SceneInfo::cameras_and_lights(&scene);
+    let cameras = SceneInfo::words(&scene.camera_choices()).into_iter();
+    let lights = SceneInfo::words(&scene.light_choices()).into_iter();
     let in_motion = boxes_in_motion(&scene);
     let mut boxes = prepared.render().tracer().boxes(umbrage_lab::SURFACE_BOXES);
     boxes.extend_from_slice(&in_motion);
@@ -83,8 +84,8 @@ fn open_and_draw(
     let notices = scene.all_notices().into_iter().map(|n| n.0);
     let info = SceneInfo {
         name: name.clone(),
-        cameras,
-        lights,
+        cameras: cameras.zip(scene.cameras.iter().cloned()).collect(),
+        lights: lights.zip(scene.lights.iter().map(|l| l.light)).collect(),
         clips: clips.collect(),
         notices: notices.chain(chosen.notices).collect(),
         bounds: in_motion.into_iter().fold(scene.bounds(), umbrage::Aabb::union),

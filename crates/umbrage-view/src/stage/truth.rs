@@ -194,7 +194,7 @@ fn level(width: u32, y: u32, step: u32) -> impl Iterator<Item = u32> {
     let Range { start, end } = 0..width;
     (start..end)
         .step_by(step as usize)
-        .filter(move |x| is_first || x % (2 * step) != 0 || y % (2 * step) != 0)
+        .filter(move |x| is_first || !x.is_multiple_of(2 * step) || !y.is_multiple_of(2 * step))
 }
 
 /// What rays find at the centre of a pixel.
