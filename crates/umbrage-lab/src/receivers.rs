@@ -20,6 +20,9 @@ pub enum Fit {
 }
 
 impl Fit {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Box, Self::Surfaces, Self::Seen];
+
     /// Returns `box`, `surfaces` or `seen`.
     pub fn name(self) -> &'static str {
         match self {

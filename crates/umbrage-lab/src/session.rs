@@ -284,7 +284,7 @@ fn read<T: FromStr<Err: std::error::Error>>(key: &str, text: &str) -> Result<T, 
 }
 
 fn read_fit(text: &str) -> Result<Fit, String> {
-    let all = [Fit::Box, Fit::Surfaces, Fit::Seen];
+    let all = Fit::ALL;
     let names = all.map(Fit::name).join(", ");
     let fit = all.into_iter().find(|fit| fit.name() == text);
     fit.ok_or_else(|| format!("fit: must be one of {names}, is {text}"))

@@ -1,11 +1,13 @@
 use crate::Error;
 use crate::samples::SAMPLE_FORMAT;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 use umbrage_wgpu::Support;
 use wgpu::{
     Adapter, AdapterInfo, Backend, Backends, Buffer, BufferDescriptor, BufferUsages, Device,
     DeviceDescriptor, DeviceType, DownlevelFlags, ExperimentalFeatures, Features, Instance,
-    InstanceDescriptor, MemoryHints, PollType, Queue, TextureUsages, Trace,
+    InstanceDescriptor, MemoryHints, PollError, PollType, Queue, TextureUsages, Trace,
 };
 
 /// A GPU device, with or without a window. Clones share it.
@@ -17,6 +19,8 @@ pub struct Gpu {
     support: Support,
     /// Whether textures can be read in another format than that in which they are written.
     pub(crate) has_view_formats: bool,
+    /// Whether other threads submit work and present with it.
+    is_shared: bool,
     trouble: Arc<Mutex<Trouble>>,
 }
 
@@ -130,7 +134,7 @@ impl Gpu {
     pub fn open() -> Result<Self, Error> {
         let mut problem = String::new();
         for adapter in Self::choices(&adapters())? {
-            match open(&adapter).and_then(|(d, q)| Self::from_device(&adapter, d, q)) {
+            match open(&adapter).and_then(|(d, q)| Self::of(&adapter, d, q, false)) {
                 Ok(gpu) => return Ok(gpu),
                 Err(e) => problem = e.to_string(),
             }
@@ -182,6 +186,10 @@ impl Gpu {
     /// # Errors
     /// The device is not suitable.
     pub fn from_device(adapter: &Adapter, device: Device, queue: Queue) -> Result<Self, Error> {
+        Self::of(adapter, device, queue, true)
+    }
+
+    fn of(adapter: &Adapter, device: Device, queue: Queue, is_shared: bool) -> Result<Self, Error> {
         let support = Support::new(adapter, &device)?;
         check_renderer(adapter)?;
         let flags = adapter.get_downlevel_capabilities().flags;
@@ -192,7 +200,12 @@ impl Gpu {
         });
         let told = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |error| {
-            lock(&told).refused.get_or_insert(error.to_string());
+            let problem = error.to_string();
+            // A window's surface cannot be resized while another thread submits work. The window
+            // tries again with its next frame, and nothing of ours went wrong.
+            if !(is_shared && problem.contains("Surface::configure")) {
+                lock(&told).refused.get_or_insert(problem);
+            }
         }));
         Ok(Self {
             device,
@@ -200,6 +213,7 @@ impl Gpu {
             info: adapter.get_info(),
             support,
             has_view_formats: flags.contains(DownlevelFlags::VIEW_FORMATS),
+            is_shared,
             trouble,
         })
     }
@@ -235,9 +249,28 @@ impl Gpu {
     /// The device was lost, or refused something, since the last check.
     pub fn wait(&self) -> Result<(), Error> {
         // The callbacks also receive the errors of this wait, with better messages.
-        let polled = self.device.poll(PollType::wait_indefinitely());
+        let polled = match self.is_shared {
+            true => self.poll_until_done(),
+            false => self.device.poll(PollType::wait_indefinitely()).map(drop),
+        };
         self.check()?;
-        polled.map(drop).map_err(|e| Error::Lost(e.to_string()))
+        polled.map_err(|e| Error::Lost(e.to_string()))
+    }
+
+    /// Waits without keeping other threads from the device: during a wait of its own, a window
+    /// could neither submit nor present.
+    fn poll_until_done(&self) -> Result<(), PollError> {
+        const PAUSE: Duration = Duration::from_micros(300);
+        let is_done = Arc::new(AtomicBool::new(false));
+        let done = Arc::clone(&is_done);
+        self.queue.on_submitted_work_done(move || done.store(true, Ordering::Release));
+        loop {
+            self.device.poll(PollType::Poll)?;
+            if is_done.load(Ordering::Acquire) || self.lost().is_some() {
+                return Ok(());
+            }
+            std::thread::sleep(PAUSE);
+        }
     }
 
     /// Makes a buffer with these contents, whose length is a multiple of four bytes. The queue

@@ -1,6 +1,7 @@
 //! Measures the time of the stages on the GPU, by timestamp queries.
 
 use crate::{Error, Gpu};
+use std::time::Duration;
 use wgpu::{CommandEncoder, Features, PollType};
 use wgpu_profiler::{GpuProfiler, GpuProfilerQuery, GpuProfilerSettings};
 
@@ -86,9 +87,20 @@ impl Timer {
     /// # Errors
     /// The device was lost, or refused something.
     pub fn read(&mut self, gpu: &Gpu) -> Result<StageTimes, Error> {
+        /// How long the times of a frame that is done may take to be there: another thread may be
+        /// handing them over.
+        const MOST_POLLS: u32 = 1000;
+        const PAUSE: Duration = Duration::from_millis(1);
         let is_timed = self.end_frame()?;
         gpu.wait()?;
-        Ok(self.newest(gpu).filter(|_| is_timed).unwrap_or_default())
+        for _ in 0..if is_timed { MOST_POLLS } else { 0 } {
+            if let Some(times) = self.newest(gpu) {
+                return Ok(times);
+            }
+            std::thread::sleep(PAUSE);
+            gpu.wait()?;
+        }
+        Ok(StageTimes::default())
     }
 
     /// Ends the frame without waiting for it, and returns the times of the newest frame that is

@@ -136,7 +136,7 @@ impl Action {
             "wipe" => Self::Wipe(numbers::<1>(verb, rest)?[0] as f32),
             "overlay" => Self::Overlay(chosen(verb, rest, &OverlayKind::ALL)?),
             "fit" => {
-                let fits = [Fit::Box, Fit::Surfaces, Fit::Seen].map(|fit| (fit, fit.name(), ""));
+                let fits = Fit::ALL.map(|fit| (fit, fit.name(), ""));
                 Self::Fit(chosen(verb, rest, &fits)?)
             }
             "sun" => {
@@ -210,7 +210,11 @@ impl Action {
 }
 
 /// The value that a word chooses.
-fn chosen<T: Copy>(verb: &str, word: &str, all: &[(T, &str, &str)]) -> Result<T, String> {
+pub(crate) fn chosen<T: Copy>(
+    verb: &str,
+    word: &str,
+    all: &[(T, &str, &str)],
+) -> Result<T, String> {
     let found = all.iter().find(|(_, name, _)| *name == word);
     found.map(|(value, ..)| *value).ok_or_else(|| {
         let names: Vec<&str> = all.iter().map(|(_, name, _)| *name).collect();

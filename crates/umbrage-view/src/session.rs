@@ -1,5 +1,6 @@
 //! Windows and session files.
 
+use crate::action::chosen;
 use crate::settings::{Compare, LightSetting, OverlayKind, Settings, TRUTH};
 use crate::stage::SceneInfo;
 use crate::sun::Sun;
@@ -60,7 +61,7 @@ impl ToOpen {
             None => (compare, false),
         };
         let overlay = session.overlay.as_deref().unwrap_or(OverlayKind::ALL[0].1);
-        let mut techniques = settings.techniques.clone();
+        let mut techniques = Settings::new("").techniques;
         for (place, technique) in techniques.iter_mut().zip(&session.techniques) {
             *place = technique.to_string();
         }
@@ -74,8 +75,8 @@ impl ToOpen {
             changes: SceneOptions { animation: None, time_s: 0.0, ..session.changes.clone() },
             opaque: session.opaque,
             techniques,
-            compare: known("compare", compare, &Compare::ALL)?,
-            overlay: known("overlay", overlay, &OverlayKind::ALL)?,
+            compare: chosen("compare", compare, &Compare::ALL)?,
+            overlay: chosen("overlay", overlay, &OverlayKind::ALL)?,
             fit: session.fit,
             light_size: session.light_size,
             ..to_open.settings
@@ -90,15 +91,6 @@ impl ToOpen {
     }
 }
 
-/// The value of a word.
-fn known<T: Copy>(key: &str, word: &str, all: &[(T, &str, &str)]) -> Result<T, String> {
-    let found = all.iter().find(|(_, name, _)| *name == word);
-    found.map(|(value, ..)| *value).ok_or_else(|| {
-        let names: Vec<&str> = all.iter().map(|(_, name, _)| *name).collect();
-        format!("{key}: must be one of {}, is {word}", names.join(", "))
-    })
-}
-
 impl Settings {
     /// The settings as a session, with pictures of this size.
     ///
@@ -110,9 +102,10 @@ impl Settings {
             Lens::Perspective { fov_y_rad } => (Some(fov_y_rad.to_degrees()), None),
             Lens::Orthographic { height } => (None, Some(height)),
         };
-        let view = match (&self.camera, &self.light) {
-            // A headlight needs to know the view.
-            (Some(name), light) if *light != LightSetting::Headlight => {
+        // A headlight needs to know the view, and an animation may move the camera.
+        let is_still = self.light != LightSetting::Headlight && self.clip.is_none();
+        let view = match &self.camera {
+            Some(name) if is_still => {
                 ViewOptions { camera: Some(name.clone()), size, ..ViewOptions::default() }
             }
             _ => ViewOptions {
@@ -173,5 +166,120 @@ pub(crate) fn to_open(path: &Path, settings: &Settings) -> Result<ToOpen, String
                 .map_err(|problem| format!("{}: {problem}", path.display()))
         }
         false => Ok(ToOpen::scene(&path.to_string_lossy(), settings)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::tests::info;
+    use umbrage::visibility::LightSize;
+    use umbrage_lab::{Defaults, choose_view};
+
+    /// What a window has after it opened a session that another one saved.
+    fn again(settings: &Settings) -> (Settings, LightOptions) {
+        let session = settings.session(&info(), [640, 360]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.json");
+        session.write(&path).unwrap();
+        let opened = to_open(&path, &Settings::new("other")).unwrap();
+        assert_eq!(opened.kind, Kind::Session);
+        // As the thread of a scene and the window do.
+        let view = match &opened.view.camera {
+            Some(_) => info().view,
+            None => choose_view(&opened.view, &Defaults::of(None)).unwrap().view,
+        };
+        let (mut settings, name) = (opened.settings, opened.view.camera.clone());
+        settings.look_from(name, &view);
+        settings.near = opened.view.near.or(settings.near);
+        settings.far = opened.view.far.or(settings.far);
+        (settings, opened.light)
+    }
+
+    fn begun() -> Settings {
+        let mut settings = Settings::new("box");
+        settings.begin_with(&info());
+        settings
+    }
+
+    #[test]
+    fn sessions_keep_what_is_seen() {
+        let mut settings = begun();
+        settings.compare = Compare::Wipe;
+        settings.overlay = OverlayKind::Partition;
+        settings.techniques = ["lispsm+z2:pcf3@512".into(), "uniform:vsm".into()];
+        settings.light_size = Some(LightSize::Degrees(0.5));
+        settings.changes.ground = true;
+        settings.opaque = true;
+        let (opened, light) = again(&settings);
+        assert_eq!(opened.camera.as_deref(), Some("gate"));
+        assert_eq!(light.light.as_deref(), Some("sun"));
+        assert_eq!(opened.techniques, settings.techniques);
+        assert_eq!([opened.near, opened.far], [settings.near, settings.far]);
+        let of = |s: &Settings| {
+            (s.scene.clone(), s.compare, s.overlay, s.light_size, s.changes.ground, s.opaque, s.fit)
+        };
+        assert_eq!(of(&opened), of(&settings));
+    }
+
+    #[test]
+    fn sessions_keep_views_and_lights_of_all_kinds() {
+        let mut settings = begun();
+        settings.pose.orbit(0.4, 0.1);
+        settings.moved();
+        for lens in [Lens::Perspective { fov_y_rad: 0.7 }, Lens::Orthographic { height: 12.0 }] {
+            settings.lens = lens;
+            let hour = LightSetting::Hour(15.0);
+            let sun = settings.clone().light;
+            for light in [sun, hour, LightSetting::Headlight, LightSetting::Named("lamp".into())] {
+                settings.light = light;
+                let (opened, options) = again(&settings);
+                assert!(opened.pose.eye.distance(settings.pose.eye) < 1e-12);
+                assert!(opened.pose.target.distance(settings.pose.target) < 1e-12);
+                let [before, after] =
+                    [&settings, &opened].map(|s| s.camera(&info(), [640, 360]).unwrap());
+                assert!((before.far() - after.far()).abs() < 1e-9);
+                assert!((before.pixel_width(5.0) - after.pixel_width(5.0)).abs() < 1e-12);
+                match &settings.light {
+                    LightSetting::Named(name) => assert_eq!(options.light.as_ref(), Some(name)),
+                    LightSetting::Headlight => assert_eq!(opened.light, LightSetting::Headlight),
+                    _ => {
+                        let sun = settings.sun().unwrap().direction();
+                        assert!(options.sun.unwrap().distance(sun) < 1e-12);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn comparisons_with_the_truth_come_back() {
+        let mut settings = begun();
+        settings.compare = Compare::Beside;
+        settings.techniques[1] = TRUTH.into();
+        let (opened, _) = again(&settings);
+        assert!(opened.compares_with_truth() && opened.compare == Compare::Beside);
+        settings.compare = Compare::Alone;
+        assert!(!again(&settings).0.compares_with_truth());
+    }
+
+    #[test]
+    fn animated_views_are_written_in_numbers() {
+        let mut settings = begun();
+        (settings.clip, settings.time_s) = (Some(0), 1.5);
+        let session = settings.session(&info(), [64, 64]).unwrap();
+        assert_eq!(session.changes.animation.as_deref(), Some("walk"));
+        assert_eq!(session.changes.time_s, 1.5);
+        assert!(session.view.camera.is_none() && session.view.eye.is_some());
+    }
+
+    #[test]
+    fn unknown_words_are_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.json");
+        let text = r#"{"version": 1, "scene": "pole", "shadows": ["uniform"], "overlay": "heat"}"#;
+        std::fs::write(&path, text).unwrap();
+        let problem = to_open(&path, &Settings::new("pole")).unwrap_err();
+        assert!(problem.contains("session.json") && problem.contains("heat"), "{problem}");
     }
 }

@@ -8,7 +8,8 @@ use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
 use umbrage_lab::{Fit, NamedTechnique, SceneOptions};
 use umbrage_scene::Lens;
 
-/// The state of a window that a session can keep.
+/// The state of a window. A session keeps what is seen: not whether dragging flies, errors are
+/// counted or fewer pixels are drawn, and the time of day as the sun that stands there.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
     /// A path, or the name of a built-in scene.
@@ -178,12 +179,12 @@ impl Settings {
         self.far = is_of_file.then_some(view.far);
     }
 
-    /// Notes that the view moved, so that it is no longer that of the scene's camera.
+    /// Notes that the view moved: it is no longer that of the scene's camera, and where it begins
+    /// and ends follows from the scene again.
     pub(crate) fn moved(&mut self) {
-        if self.camera.take().is_some() {
-            self.near = None;
-            self.far = None;
-        }
+        self.camera = None;
+        self.near = None;
+        self.far = None;
     }
 
     /// The camera of a picture of this size.
@@ -218,10 +219,9 @@ impl Settings {
             }
         };
         // Any range will do to find where the surfaces begin and end.
-        let [near, far] = depth_range(&wide(1e-3, 1e3)?, info);
+        let [near, far] = depth_range(&wide(1e-3, 1e3)?, pose.distance(), info);
         let far = self.far.unwrap_or(far);
-        let near = self.near.unwrap_or(near).min(far * 0.5);
-        wide(near, self.far.unwrap_or(far.max(2.0 * near)))
+        wide(self.near.unwrap_or(near).min(far * 0.5), far)
     }
 
     /// The light of a frame.
@@ -233,7 +233,8 @@ impl Settings {
                 let index = info.lights.iter().position(|(name, _)| name == word);
                 index.map_or(Shining::Light(info.light), Shining::OfScene)
             }
-            (None, _) => sun(self.pose.forward()),
+            // The light of a view that is kept stays with it.
+            (None, _) => sun(self.frozen.map_or(self.pose.forward(), |camera| camera.forward())),
         }
     }
 
@@ -243,6 +244,14 @@ impl Settings {
             LightSetting::Sun(sun) => Some(sun),
             LightSetting::Hour(hour) => Some(Sun::at_hour(hour)),
             LightSetting::Headlight | LightSetting::Named(_) => None,
+        }
+    }
+
+    /// Whether the light is parallel.
+    fn is_sun(&self, info: &SceneInfo) -> bool {
+        match self.light(info) {
+            Shining::Light(light) => light.position().is_none(),
+            Shining::OfScene(index) => info.lights[index].1.position().is_none(),
         }
     }
 
@@ -270,6 +279,7 @@ impl Settings {
         info: &SceneInfo,
         image: [u32; 2],
         map: Option<usize>,
+        wants_body: bool,
     ) -> Result<Request, String> {
         Ok(Request {
             camera: self.camera(info, image).map_err(|e| e.to_string())?,
@@ -283,7 +293,11 @@ impl Settings {
             wants_truth: self.counts_errors
                 || self.compares_with_truth()
                 || self.overlay == OverlayKind::Difference,
-            light_size: self.light_size,
+            light_size: self.light_size.filter(|size| {
+                // A size in the other unit is left over from a light of the other kind.
+                matches!(size, LightSize::Degrees(_)) == self.is_sun(info)
+            }),
+            wants_body,
         })
     }
 }
@@ -291,9 +305,10 @@ impl Settings {
 /// Where a view of a scene begins and ends, metres: before the nearest of the boxes around the
 /// surfaces that it sees, and behind the last one. The plan gains little from a nearer beginning,
 /// because it is fitted to the boxes anyway.
-fn depth_range(camera: &Camera, info: &SceneInfo) -> [f64; 2] {
-    /// Largest ratio of far to near distance where the viewer is amid the surfaces.
-    const RATIO: f64 = 2000.0;
+fn depth_range(camera: &Camera, to_target: f64, info: &SceneInfo) -> [f64; 2] {
+    /// Where the viewer is amid the surfaces, the view begins at this share of its far distance or
+    /// of the distance to the target, whichever is less.
+    const SHARES: [f64; 2] = [1.0 / 2000.0, 1.0 / 50.0];
     let depths = |aabb: &Aabb| aabb.corners().map(|corner| camera.depth(corner));
     let farthest = depths(&info.bounds).into_iter().fold(0.0, f64::max);
     let far = if farthest > 0.0 { farthest * 1.01 } else { 100.0 };
@@ -304,7 +319,8 @@ fn depth_range(camera: &Camera, info: &SceneInfo) -> [f64; 2] {
     let seen =
         info.boxes.iter().filter(|b| !b.is_empty() && sides.iter().all(|p| p.may_touch(**b)));
     let nearest = seen.flat_map(depths).fold(f64::INFINITY, f64::min);
-    [nearest.clamp(far / RATIO, far / 4.0) * 0.99, far]
+    let least = (far * SHARES[0]).min(to_target * SHARES[1]).max(far * 1e-6);
+    [nearest.clamp(least, far / 2.0) * 0.99, far]
 }
 
 /// The planes of the picture's sides, which point inwards.
@@ -317,4 +333,105 @@ fn side_planes(camera: &Camera) -> [umbrage::Plane; 4] {
         let inward = if normal.dot(camera.forward()) < 0.0 { -normal } else { normal };
         umbrage::Plane::through(camera.eye(), inward)
     })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use glam::DVec3;
+    use umbrage_scene::SceneCamera;
+
+    /// A scene of one box, with a camera and two lights.
+    pub(crate) fn info() -> SceneInfo {
+        let bounds = Aabb::new(DVec3::new(-10.0, 0.0, -10.0), DVec3::new(10.0, 5.0, 10.0));
+        let view = SceneCamera {
+            name: "gate".into(),
+            eye: DVec3::new(0.0, 2.0, 40.0),
+            target: DVec3::new(0.0, 2.0, 0.0),
+            up: DVec3::Y,
+            lens: Lens::Perspective { fov_y_rad: 0.8 },
+            near: 0.5,
+            far: 90.0,
+        };
+        let lamp = umbrage::PointLight { position: DVec3::Y, range: 9.0, near: 0.01 };
+        let sun = Light::Directional { direction: DVec3::new(0.3, -1.0, 0.2) };
+        SceneInfo {
+            name: "box".into(),
+            cameras: vec![("gate".into(), view.clone())],
+            lights: vec![("sun".into(), sun), ("lamp".into(), Light::Point(lamp))],
+            clips: vec![("walk".into(), 2.0)],
+            notices: Vec::new(),
+            bounds,
+            boxes: vec![bounds],
+            view,
+            view_name: Some("gate".into()),
+            light: sun,
+            light_name: Some("sun".into()),
+            clip: None,
+            triangles: 12,
+        }
+    }
+
+    fn settings() -> Settings {
+        let mut settings = Settings::new("box");
+        settings.begin_with(&info());
+        settings
+    }
+
+    #[test]
+    fn a_view_begins_before_its_surfaces_and_ends_behind_them() {
+        let (info, mut settings) = (info(), settings());
+        let range = |settings: &Settings| {
+            let camera = settings.camera(&info, [64, 64]).unwrap();
+            [camera.near(), camera.far()]
+        };
+        assert_eq!(range(&settings), [0.5, 90.0], "that of the file's camera");
+        settings.moved();
+        let [near, far] = range(&settings);
+        assert!((24.0..30.0).contains(&near) && (50.0..51.0).contains(&far), "{near} {far}");
+        // Amid the surfaces, the view begins near the eye, and nearer if the target is near.
+        settings.pose.eye = DVec3::new(0.0, 2.0, 5.0);
+        let [amid, _] = range(&settings);
+        assert!(amid < 0.02, "{amid}");
+        settings.pose.target = DVec3::new(0.0, 2.0, 4.9);
+        assert!(range(&settings)[0] < amid);
+        // Where nothing is seen there still is a view.
+        settings.pose = Pose::new(DVec3::Y * 900.0, DVec3::Y * 1000.0, DVec3::Z);
+        let [near, far] = range(&settings);
+        assert!(0.0 < near && near < far && far.is_finite());
+    }
+
+    #[test]
+    fn sizes_of_the_other_kind_of_light_are_left_out() {
+        let (info, mut settings) = (info(), settings());
+        let size = |settings: &Settings| {
+            settings.request(&info, [64, 64], None, false).unwrap().light_size
+        };
+        settings.light_size = Some(LightSize::Degrees(0.5));
+        assert!(size(&settings).is_some());
+        settings.light = LightSetting::Named("lamp".into());
+        assert_eq!(size(&settings), None);
+        settings.light_size = Some(LightSize::Metres(0.2));
+        assert!(size(&settings).is_some());
+    }
+
+    #[test]
+    fn a_frozen_headlight_stays() {
+        let (info, mut settings) = (info(), settings());
+        settings.light = LightSetting::Headlight;
+        let before = settings.light(&info);
+        settings.frozen = Some(settings.camera(&info, [64, 64]).unwrap());
+        settings.pose.orbit(1.0, 0.2);
+        assert_eq!(settings.light(&info), before);
+        settings.frozen = None;
+        assert_ne!(settings.light(&info), before);
+    }
+
+    #[test]
+    fn a_wrong_text_is_told() {
+        let (info, mut settings) = (info(), settings());
+        settings.techniques[0] = "lispm".into();
+        let problem = settings.request(&info, [64, 64], None, false).unwrap_err();
+        assert!(problem.contains("lispsm"), "{problem}");
+    }
 }

@@ -47,7 +47,7 @@ pub enum Error {
     },
 }
 
-/// The number of times in a row that a lost device is replaced.
+/// The number of times that a lost device is replaced.
 const MOST_LOSSES: u32 = 5;
 
 /// Opens a window and returns when it is closed.

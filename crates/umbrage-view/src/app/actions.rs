@@ -116,9 +116,12 @@ impl App<'_> {
                 settings.moved();
             }
             Action::Approach(share) => {
-                settings.pose.approach(share);
-                if let Lens::Orthographic { height } = &mut settings.lens {
-                    *height = (*height * share).clamp(1e-6, 1e11);
+                match &mut settings.lens {
+                    Lens::Perspective { .. } => settings.pose.approach(share),
+                    // Going nearer would not make anything larger.
+                    Lens::Orthographic { height } => {
+                        *height = (*height * share).clamp(1e-6, 1e11);
+                    }
                 }
                 settings.moved();
             }
@@ -129,6 +132,9 @@ impl App<'_> {
             }
             Action::CountErrors(counts) => settings.counts_errors = counts,
             Action::Panel(panel, is_shown) => self.show(panel, is_shown),
+            Action::Clip(_) | Action::Play(true) | Action::Seek(_) if self.needs_rest => {
+                return Err("wait until the running job is done: it needs the scene at rest".into());
+            }
             Action::Clip(place) => {
                 let clips = self.info.as_ref().map_or(0, |info| info.clips.len());
                 if place > clips {
@@ -149,6 +155,7 @@ impl App<'_> {
             }
             Action::Seek(seconds) => settings.time_s = seconds.max(0.0),
             Action::TryThese => {
+                self.check_rest()?;
                 self.show(Panel::TryThese, true);
                 self.measure_presets();
             }
@@ -197,7 +204,16 @@ impl App<'_> {
         Ok(())
     }
 
+    /// Refuses jobs that draw the scene by themselves while an animation moves it.
+    fn check_rest(&self) -> Result<(), String> {
+        match self.kept.settings.clip {
+            Some(_) => Err("this needs the scene at rest; choose `at rest` first".into()),
+            None => Ok(()),
+        }
+    }
+
     fn turntable(&mut self, count: u32, folder: PathBuf) -> Result<(), String> {
+        self.check_rest()?;
         let info = self.info.clone().ok_or("no scene is open")?;
         let frame = self.frame.clone().ok_or("there is no picture yet")?;
         let settings = &self.kept.settings;

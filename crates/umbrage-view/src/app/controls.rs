@@ -9,6 +9,7 @@ use egui::{
     TextEdit, Ui,
 };
 use std::collections::HashSet;
+use std::path::PathBuf;
 use umbrage::visibility::LightSize;
 use umbrage_lab::Fit;
 use umbrage_scene::Lens;
@@ -62,6 +63,8 @@ fn note_tip(response: &Response) {
 impl App<'_> {
     /// The bars at the top and at the bottom.
     pub(super) fn bars(&mut self, ui: &mut Ui) {
+        // A control that loses its tooltip must not be taken for one that has it.
+        ui.ctx().data_mut(|data| data.insert_temp(tipped_id(), Tipped::default()));
         egui::Panel::top("bar").show(ui, |ui| {
             ui.add_space(2.0);
             ui.horizontal_wrapped(|ui| self.top(ui));
@@ -314,7 +317,11 @@ impl App<'_> {
             let mut with_truth = self.kept.settings.techniques[1] == TRUTH;
             let check = ui.checkbox(&mut with_truth, "compare with ray-traced truth");
             if check.tip("Show the truth in place of a second technique.").changed() {
-                let other = if with_truth { TRUTH } else { "uniform:pcf3@1024" };
+                let other = match &self.drafts[1].text {
+                    _ if with_truth => TRUTH,
+                    text if text == TRUTH => "uniform:pcf3@1024",
+                    text => text,
+                };
                 actions.push(Action::Technique(1, other.to_owned()));
             }
             if !with_truth && let Some(text) = self.drafts[1].show(ui, "second") {
@@ -529,18 +536,18 @@ impl App<'_> {
         ui.horizontal_wrapped(|ui| {
             if ui.button("save picture").tip("Save the first picture as a PNG (ctrl+P).").clicked()
             {
-                actions.push(Action::Save("umbrage-view.png".into()));
+                actions.push(Action::Save(free("umbrage-view", ".png")));
             }
             let turn = ui.button("turntable").tip("Save 36 pictures of a turn around the target.");
             if turn.clicked() {
-                actions.push(Action::Turntable(36, "umbrage-turntable".into()));
+                actions.push(Action::Turntable(36, free("umbrage-turntable", "")));
             }
             if ui
                 .button("save session")
                 .tip("Save all that is set, to open it again (ctrl+S).")
                 .clicked()
             {
-                actions.push(Action::SaveSession("umbrage-session.json".into()));
+                actions.push(Action::SaveSession(free("umbrage-session", ".json")));
             }
         });
         self.act_all(ui.ctx(), actions);
@@ -550,6 +557,13 @@ impl App<'_> {
 /// The action that sets a sun.
 pub(super) fn sun_action(sun: Sun) -> Action {
     Action::Sun { azimuth_deg: sun.azimuth_deg, elevation_deg: sun.elevation_deg }
+}
+
+/// A path in the process's folder at which nothing is yet: `name.png`, `name-2.png` and so on.
+pub(super) fn free(name: &str, ending: &str) -> PathBuf {
+    let numbered = (2..).map(|i| PathBuf::from(format!("{name}-{i}{ending}")));
+    let mut paths = std::iter::once(PathBuf::from(format!("{name}{ending}"))).chain(numbered);
+    paths.find(|path| !path.exists()).unwrap_or_default()
 }
 
 /// A part of the panel that can be closed.

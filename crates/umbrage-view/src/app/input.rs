@@ -1,13 +1,13 @@
 //! Mouse, keys, dropped files, and the passing of time.
 
 use super::App;
-use super::controls::sun_action;
+use super::controls::{free, sun_action};
 use super::picture::share;
 use crate::action::{Action, Panel};
 use crate::settings::{Compare, OverlayKind};
 use crate::sun::Sun;
 use egui::{EventFilter, Key, Modifiers, PointerButton, Rect, Response, Ui};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use umbrage::Light;
 
 /// Angle of a turn for a point that the mouse moves, degrees.
@@ -18,6 +18,9 @@ const KEY_TURN_DEG: f64 = 60.0;
 
 /// Share of the distance to the target that a second of a key moves the viewer by.
 const KEY_STEP: f64 = 0.6;
+
+/// How far from the line of a wipe a drag may begin that moves the line, points.
+const WIPE_REACH: f32 = 24.0;
 
 /// The key, and what it does, for the list of keys.
 pub(super) const KEYS: &[(&str, &str)] = &[
@@ -82,6 +85,11 @@ impl App<'_> {
             );
         }
         self.mouse_depth = response.hover_pos().and_then(|at| self.depth_at(share(rect, at)));
+        if response.drag_started() {
+            let at = response.interact_pointer_pos().map_or(0.0, |at| share(rect, at)[0]);
+            self.is_wiping = self.kept.settings.compare == Compare::Wipe
+                && (at - self.kept.shown.wipe).abs() * rect.width() < WIPE_REACH;
+        }
         let by = response.drag_delta();
         let (modifiers, is_light_key) = ui.input(|i| (i.modifiers, i.key_down(Key::L)));
         let is_secondary = response.dragged_by(PointerButton::Secondary)
@@ -90,15 +98,13 @@ impl App<'_> {
             let [right, down] = [f64::from(by.x), f64::from(by.y)];
             let turn = [right * TURN_DEG, -down * TURN_DEG];
             let at = response.interact_pointer_pos().map_or([0.5, 0.5], |at| share(rect, at));
-            let is_wiping = self.kept.settings.compare == Compare::Wipe
-                && (at[0] - self.kept.shown.wipe).abs() * rect.width() < 24.0 + by.x.abs();
             if modifiers.alt || is_light_key {
                 self.turn_sun(context, turn);
             } else if is_secondary || modifiers.shift {
                 let height = f64::from(rect.height().max(1.0));
                 let scale = self.kept.settings.pose.distance() / height;
                 self.act(context, Action::Walk(DVec3::new(-right, down, 0.0) * scale));
-            } else if is_wiping {
+            } else if self.is_wiping {
                 self.act(context, Action::Wipe(at[0]));
             } else if self.kept.settings.is_flying {
                 self.act(context, Action::Look([-turn[0], -turn[1]]));
@@ -129,26 +135,12 @@ impl App<'_> {
         }
     }
 
-    /// The distance along the view of what a point of the picture shows, by the truth; `None` where
-    /// that is not known.
+    /// The distance along the view of what a point of the picture shows, as far as the truth is
+    /// known.
     fn depth_at(&self, [x, y]: [f32; 2]) -> Option<f64> {
-        let camera = &self.frame.as_ref()?.request.camera;
         let x = if self.kept.settings.compare == Compare::Beside { x * 2.0 % 1.0 } else { x };
-        let [width, height] = camera.image().map(f64::from);
-        let pixel = DVec2::new(f64::from(x) * width, f64::from(y) * height);
-        let info = self.info.as_ref()?;
-        // The boxes around the surfaces tell the depth well enough for a mark in a plot.
-        let ray = camera.ray(pixel);
-        let (start, direction) = (camera.eye() + ray.start, ray.direction);
-        let hit = |aabb: &umbrage::Aabb| {
-            let a = (aabb.min - start) / direction;
-            let b = (aabb.max - start) / direction;
-            let enter = a.min(b).max_element();
-            let leave = a.max(b).min_element();
-            (enter <= leave && leave > camera.near()).then_some(enter.max(camera.near()))
-        };
-        let nearest = info.boxes.iter().filter_map(hit).fold(f64::INFINITY, f64::min);
-        nearest.is_finite().then_some(nearest)
+        let [width, height] = self.frame.as_ref()?.request.camera.image().map(|n| n as f32);
+        self.judged.depth((x * width) as u32, (y * height) as u32)
     }
 
     /// What keys do that no control wants.
@@ -161,8 +153,9 @@ impl App<'_> {
             };
             (i.events.iter().filter_map(pressed).collect::<Vec<Key>>(), i.modifiers)
         });
+        let focus = context.memory(egui::Memory::focused);
         for key in pressed {
-            if let Some(action) = self.shortcut(key, modifiers, is_typing) {
+            if let Some(action) = self.shortcut(key, modifiers, is_typing, focus) {
                 self.act(context, action);
             }
         }
@@ -175,13 +168,19 @@ impl App<'_> {
         }
     }
 
-    fn shortcut(&mut self, key: Key, modifiers: Modifiers, is_typing: bool) -> Option<Action> {
+    fn shortcut(
+        &mut self,
+        key: Key,
+        modifiers: Modifiers,
+        is_typing: bool,
+        focus: Option<egui::Id>,
+    ) -> Option<Action> {
         match key {
             Key::F1 => return Some(Action::Panel(Panel::Help, !self.is_shown(Panel::Help))),
             Key::S if modifiers.command => {
-                return Some(Action::SaveSession("umbrage-session.json".into()));
+                return Some(Action::SaveSession(free("umbrage-session", ".json")));
             }
-            Key::P if modifiers.command => return Some(Action::Save("umbrage-view.png".into())),
+            Key::P if modifiers.command => return Some(Action::Save(free("umbrage-view", ".png"))),
             Key::Escape => {
                 if self.kept.message.take().is_none()
                     && let Some(panel) =
@@ -194,6 +193,8 @@ impl App<'_> {
             _ if is_typing || modifiers.command || modifiers.ctrl || modifiers.alt => return None,
             _ => {}
         }
+        // A button that has the focus is pressed by the same key.
+        let is_elsewhere = focus.is_some() && focus != self.picture_id;
         let settings = &self.kept.settings;
         let overlay = |i: usize| Some(Action::Overlay(OverlayKind::ALL[i].0));
         match key {
@@ -211,12 +212,11 @@ impl App<'_> {
             Key::P => Some(Action::TryThese),
             Key::T => Some(Action::Panel(Panel::Theory, !self.is_shown(Panel::Theory))),
             Key::H => Some(Action::Hour(15.0)),
-            Key::Space if settings.clip.is_some() => Some(Action::Play(!settings.is_playing)),
-            Key::X => {
+            Key::Space if settings.clip.is_some() && !is_elsewhere => {
+                Some(Action::Play(!settings.is_playing))
+            }
+            Key::X if !settings.compares_with_truth() => {
                 self.kept.settings.techniques.swap(0, 1);
-                if self.kept.settings.techniques[0] == crate::settings::TRUTH {
-                    self.kept.settings.techniques.swap(0, 1);
-                }
                 self.drafts.swap(0, 1);
                 None
             }

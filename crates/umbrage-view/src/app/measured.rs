@@ -50,7 +50,9 @@ pub(super) struct Judged {
     pub(super) tallies: [Option<Tally>; 2],
     /// Whether more is known than was counted.
     pub(super) is_stale: bool,
+    /// When it was counted last, and how long counting and composing took then.
     counted_at: Option<Instant>,
+    took: Duration,
     /// The truth, and the difference of each technique to it, as egui shows them, with the version
     /// of the truth that they show.
     truth_texture: Option<(TextureHandle, u64)>,
@@ -71,12 +73,14 @@ impl Judged {
         self.is_stale = true;
     }
 
-    pub(super) fn add(&mut self, visibility: Visibility) {
-        let index = visibility.technique;
-        if let Some(place) = self.visibility.get_mut(index) {
-            *place = Some(visibility);
-            self.is_stale = true;
+    /// Takes more rows of a picture.
+    pub(super) fn add(&mut self, rows: Visibility) {
+        let Some(place) = self.visibility.get_mut(rows.technique) else { return };
+        match place {
+            Some(known) if known.frame == rows.frame => known.values.extend(rows.values),
+            _ => *place = Some(rows),
         }
+        self.is_stale = true;
     }
 
     /// Forgets what is of another frame.
@@ -89,15 +93,20 @@ impl Judged {
         }
     }
 
-    /// Counts wrong pixels as far as they are known.
-    pub(super) fn count(&mut self, frame: &Option<Arc<Frame>>) {
-        let is_due = self.counted_at.is_none_or(|at| at.elapsed() >= Self::EVERY);
-        let (Some(truth), Some(frame)) = (&self.truth, frame) else { return };
-        if !self.is_stale || !is_due {
-            return;
+    /// Counts wrong pixels as far as they are known. If it is too early for that, gives the time
+    /// after which to come again.
+    pub(super) fn count(&mut self, frame: &Option<Arc<Frame>>) -> Option<Duration> {
+        let (Some(truth), Some(frame)) = (&self.truth, frame) else { return None };
+        if !self.is_stale {
+            return None;
         }
+        // At most a quarter of the window's time goes into this.
+        let pause = Self::EVERY.max(self.took * 3);
+        if let Some(at) = self.counted_at.filter(|at| at.elapsed() < pause) {
+            return Some(pause.saturating_sub(at.elapsed()));
+        }
+        let start = Instant::now();
         self.is_stale = false;
-        self.counted_at = Some(Instant::now());
         self.version += 1;
         let truth = truth.lock();
         for (i, picture) in frame.pictures.iter().enumerate().take(2) {
@@ -105,6 +114,29 @@ impl Judged {
             self.tallies[i] =
                 visibility.and_then(|v| errors(&truth, v, picture.technique.is_soft()));
         }
+        self.took = start.elapsed();
+        self.counted_at = Some(Instant::now());
+        None
+    }
+
+    /// Notes what composing a picture of the truth took.
+    fn composed(&mut self, start: Instant) {
+        self.took += start.elapsed();
+        self.counted_at = Some(Instant::now());
+    }
+
+    /// Why there is no truth, and the share of it that is known.
+    pub(super) fn state(&self) -> Option<(Option<String>, f32)> {
+        let truth = self.truth.as_ref()?.lock();
+        Some((truth.problem.clone(), truth.share))
+    }
+
+    /// The distance along the view of what a pixel shows, metres, as far as it is known.
+    pub(super) fn depth(&self, x: u32, y: u32) -> Option<f64> {
+        let truth = self.truth.as_ref()?.lock();
+        let [width, height] = truth.size;
+        let known = (x < width && y < height).then(|| truth.known(x, y)).flatten()?;
+        Some(f64::from(truth.depth[known])).filter(|depth| depth.is_finite())
     }
 
     /// Whether the truth is traced and all that is known is counted.
@@ -127,12 +159,15 @@ impl Judged {
         let is_new =
             self.truth_texture.as_ref().is_none_or(|(_, version)| *version != self.version);
         if is_new {
+            let start = Instant::now();
             let [width, height] = truth.size;
             let colors = pixels(width, height)
                 .map(|(x, y)| truth.known(x, y).map_or(Color32::BLACK, |i| color(truth.color[i])));
             let image = ColorImage::new([width as usize, height as usize], colors.collect());
             let version = self.version;
+            drop(truth);
             set(&mut self.truth_texture, context, "truth", image, version);
+            self.composed(start);
         }
         self.truth_texture.as_ref().map(|(texture, _)| texture.clone())
     }
@@ -151,6 +186,7 @@ impl Judged {
         }
         let place = &mut self.differences[technique];
         if place.as_ref().is_none_or(|(_, version)| *version != self.version) {
+            let start = Instant::now();
             let [width, height] = truth.size;
             let of_truth = truth.visibility(is_soft);
             let known: Vec<Option<usize>> =
@@ -172,8 +208,10 @@ impl Judged {
             let colors = map.pixels().iter().map(|&rgb| color(rgb)).collect();
             let image = ColorImage::new([width as usize, height as usize], colors);
             set(place, context, "difference", image, self.version);
+            drop(truth);
+            self.composed(start);
         }
-        place.as_ref().map(|(texture, _)| texture.clone())
+        self.differences[technique].as_ref().map(|(texture, _)| texture.clone())
     }
 }
 

@@ -82,8 +82,10 @@ pub(crate) struct App<'k> {
     /// The newest frame, and the request that was sent last.
     frame: Option<Arc<Frame>>,
     asked: Option<Request>,
-    /// Why there is no frame of the present settings.
+    /// What is wrong with the present settings or with their frame.
     problem: Option<String>,
+    /// Whether no frame can be asked for with the present settings.
+    is_impossible: bool,
     judged: Judged,
     history: History,
     presets: Presets,
@@ -91,16 +93,19 @@ pub(crate) struct App<'k> {
     opening: Option<(ToOpen, &'static str, Instant)>,
     /// The long job that runs, with the share that is done.
     job: Option<(String, f32)>,
+    /// Whether the job that runs needs the scene at rest.
+    needs_rest: bool,
     /// The technique texts as they are being edited.
     drafts: [technique::Draft; 2],
     /// The picture's area, as egui knows it.
     picture_id: Option<egui::Id>,
     picture_rect: egui::Rect,
+    /// Whether the present drag moves the line of a wipe.
+    is_wiping: bool,
     /// The point under the mouse: its distance along the view, metres.
     mouse_depth: Option<f64>,
     /// Size of the picture's area, pixels.
     image: [u32; 2],
-    last_tick: Instant,
     /// When the window was asked for, until its first picture is drawn.
     first_picture: Option<Instant>,
     /// The text in the field for a scene's name or path.
@@ -127,17 +132,19 @@ impl<'k> App<'k> {
             frame: None,
             asked: None,
             problem: None,
+            is_impossible: false,
             judged: Judged::default(),
             history: History::default(),
             presets: Presets::default(),
             opening: None,
             job: None,
+            needs_rest: false,
             drafts,
             picture_id: None,
             picture_rect: egui::Rect::ZERO,
+            is_wiping: false,
             mouse_depth: None,
             image: [1, 1],
-            last_tick: Instant::now(),
             first_picture: None,
             path,
         };
@@ -180,6 +187,7 @@ impl<'k> App<'k> {
         self.stage.open(SceneToOpen {
             name: to_open.settings.scene.clone(),
             changes: to_open.settings.changes.clone(),
+            clip: to_open.clip.as_ref().map(|(word, _)| word.clone()),
             opaque: to_open.settings.opaque,
             view: to_open.view.clone(),
             light: to_open.light.clone(),
@@ -192,6 +200,7 @@ impl<'k> App<'k> {
             return self.complain("one thing at a time: wait until the running job is done");
         }
         self.job = Some((what.to_owned(), 0.0));
+        self.needs_rest = matches!(job, Job::Measure { .. } | Job::Turntable { .. });
         self.stage.begin(job);
     }
 
@@ -206,7 +215,9 @@ impl<'k> App<'k> {
                 }
                 News::Open(info) => self.opened(info),
                 News::Failed(problem) => {
-                    self.opening = None;
+                    if !self.stage.is_opening() {
+                        self.opening = None;
+                    }
                     self.complain(problem);
                 }
                 News::Frame(frame) => self.take_frame(frame),
@@ -218,6 +229,7 @@ impl<'k> App<'k> {
                 News::Measured(measurement) => self.presets.add(measurement),
                 News::JobDone(done) => {
                     self.job = None;
+                    self.needs_rest = false;
                     match done {
                         Ok(done) => self.say(done),
                         Err(problem) => self.complain(problem),
@@ -228,10 +240,9 @@ impl<'k> App<'k> {
     }
 
     fn refused(&mut self, problem: String) {
-        // The window's surface cannot be resized while a thread of the stage submits work. egui
-        // tries again with the next frame.
-        if problem.contains("Surface::configure") {
-            return log::debug!("{problem}");
+        // What a lost device refuses is told when its loss is.
+        if self.gpu.lost().is_some() {
+            return;
         }
         if self.kept.driver.is_some() {
             self.kept.outcome = Outcome::Failed(problem.clone());
@@ -256,8 +267,8 @@ impl<'k> App<'k> {
                 settings.light = LightSetting::Headlight;
             }
         }
-        if let Some((word, time_s)) = clip {
-            settings.clip = info.clips.iter().position(|(known, _)| *known == word);
+        if let Some((_, time_s)) = clip {
+            settings.clip = info.clip;
             settings.time_s = time_s;
         }
         self.path.clone_from(&settings.scene);
@@ -270,9 +281,11 @@ impl<'k> App<'k> {
             self.say(format!("{}{more}", info.notices[0]));
         }
         self.info = Some(info);
+        self.textures.clear();
         self.frame = None;
         self.asked = None;
         self.job = None;
+        self.needs_rest = false;
         self.judged = Judged::default();
         self.presets = Presets::default();
         self.history = History::default();
@@ -284,8 +297,6 @@ impl<'k> App<'k> {
         }
         self.textures.show(&frame);
         self.history.add(&frame);
-        let failed = frame.pictures.iter().find_map(|p| p.drawn.as_ref().err().map(|e| (p, e)));
-        self.problem = failed.map(|(picture, problem)| format!("{}: {problem}", picture.technique));
         self.judged.frame_changed(frame.number);
         self.frame = Some(frame);
     }
@@ -294,13 +305,17 @@ impl<'k> App<'k> {
     fn ask(&mut self) {
         let Some(info) = &self.info else { return };
         let map = self.is_shown(Panel::Map).then_some(self.kept.shown.map);
-        match self.kept.settings.request(info, self.image, map) {
+        let is_outside = self.kept.settings.frozen.is_some();
+        let wants_body = is_outside || self.is_shown(Panel::LightSpace);
+        let request = self.kept.settings.request(info, self.image, map, wants_body);
+        self.is_impossible = request.is_err();
+        match request {
             Ok(request) => {
                 if self.asked.as_ref() != Some(&request) {
                     self.stage.draw(request.clone());
                     self.asked = Some(request);
-                    self.problem = None;
                 }
+                self.problem = self.frame.as_deref().and_then(problem_of);
             }
             Err(problem) => self.problem = Some(problem),
         }
@@ -309,15 +324,7 @@ impl<'k> App<'k> {
     /// Whether the picture shows what is asked for, or cannot.
     fn is_up_to_date(&self) -> bool {
         let shows = self.frame.as_ref().is_some_and(|f| Some(&f.request) == self.asked.as_ref());
-        self.opening.is_none() && (shows || self.info.is_none() || self.problem.is_some())
-    }
-
-    /// The seconds since the last frame of the window.
-    fn tick(&mut self) -> f64 {
-        let now = Instant::now();
-        let seconds = now.duration_since(self.last_tick).min(Duration::from_millis(250));
-        self.last_tick = now;
-        seconds.as_secs_f64()
+        self.opening.is_none() && (shows || self.info.is_none() || self.is_impossible)
     }
 
     /// Looks after the device. Gives whether the window must be opened again.
@@ -340,6 +347,12 @@ impl<'k> App<'k> {
     }
 }
 
+/// Why one of a frame's pictures could not be drawn.
+fn problem_of(frame: &Frame) -> Option<String> {
+    let failed = frame.pictures.iter().find_map(|p| p.drawn.as_ref().err().map(|e| (p, e)));
+    failed.map(|(picture, problem)| format!("{}: {problem}", picture.technique))
+}
+
 impl Message {
     pub(crate) fn new(text: impl Into<String>, is_error: bool) -> Self {
         Self { text: text.into(), is_error, since: Instant::now() }
@@ -357,7 +370,9 @@ impl eframe::App for App<'_> {
     fn logic(&mut self, context: &egui::Context, _: &mut eframe::Frame) {
         if !self.is_lost(context) {
             self.take_news();
-            self.judged.count(&self.frame);
+            if let Some(later) = self.judged.count(&self.frame) {
+                context.request_repaint_after(later);
+            }
             self.drive(context);
         }
     }
@@ -370,7 +385,8 @@ impl eframe::App for App<'_> {
             log::info!("the window is open after {:.2?}", began.elapsed());
             self.first_picture = Some(began);
         }
-        let seconds = self.tick();
+        // After a rest, the time since the last frame says nothing about this one.
+        let seconds = f64::from(ui.input(|i| i.stable_dt).min(0.1));
         self.play(ui.ctx(), seconds);
         self.drop_files(ui.ctx());
         self.keys(ui.ctx(), seconds);

@@ -100,7 +100,7 @@ impl App<'_> {
         let context = painter.ctx().clone();
         let Some(shown) = self.shown(&context, index) else { return };
         paint(painter, rect, shown.id);
-        caption(painter, rect, &shown);
+        self.caption(painter, rect, &shown);
         self.outside(painter, rect, index);
     }
 
@@ -109,8 +109,30 @@ impl App<'_> {
         let Some(shown) = self.shown(ui.ctx(), index) else { return };
         let painter = ui.painter_at(part);
         paint(&painter, rect, shown.id);
-        caption(&painter, part, &shown);
+        self.caption(&painter, part, &shown);
         self.outside(&painter, rect, index);
+    }
+
+    /// Names a picture, and tells how wrong it is.
+    fn caption(&self, painter: &Painter, rect: Rect, shown: &Shown) {
+        let mut text = shown.name.clone();
+        let errors = shown.tally.and_then(|t| Some((t.wrong_fraction()?, t.mean_abs_error()?)));
+        match (self.judged.state(), errors) {
+            (Some((Some(problem), _)), _) => text += &format!("\nno truth: {problem}"),
+            (Some((None, share)), Some((wrong, mean))) => {
+                let [wrong, mean] = [wrong, mean].map(|v| v * 100.0);
+                text += &format!("\nwrong {wrong:.2}%, mean error {mean:.2}%");
+                if share < 1.0 {
+                    text += &format!(" ({:.0}% traced)", share * 100.0);
+                }
+            }
+            _ => {}
+        }
+        let width = (rect.width() - 24.0).max(0.0);
+        let galley = painter.layout(text, FontId::proportional(13.0), Color32::WHITE, width);
+        let area = Rect::from_min_size(rect.min + vec2(8.0, 8.0), galley.size() + vec2(12.0, 8.0));
+        painter.rect_filled(area, 4.0, Color32::from_black_alpha(170));
+        painter.galley(area.min + vec2(6.0, 4.0), galley, Color32::WHITE);
     }
 
     /// What is seen of a plan that is kept, from outside.
@@ -153,6 +175,13 @@ impl App<'_> {
                 )
             }
             (None, Some(problem), _) => problem.clone(),
+            (None, None, Some(frame)) if frame.request.planned_for.is_some() => {
+                let settings = &self.kept.settings;
+                if !settings.compares_with_truth() && settings.overlay != OverlayKind::Difference {
+                    return;
+                }
+                "no truth is traced while the plan is frozen".to_owned()
+            }
             (None, None, None) if self.info.is_none() => {
                 "no scene; drop a .glb file here".to_owned()
             }
@@ -175,22 +204,6 @@ pub(super) fn drawn(frame: &crate::stage::Frame, index: usize) -> Option<&DrawnP
 fn paint(painter: &Painter, rect: Rect, id: TextureId) {
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     painter.image(id, rect, whole, Color32::WHITE);
-}
-
-/// Names a picture, and tells how wrong it is.
-fn caption(painter: &Painter, rect: Rect, shown: &Shown) {
-    let errors = shown.tally.and_then(|t| Some((t.wrong_fraction()?, t.mean_abs_error()?)));
-    let text = match errors {
-        Some((wrong, mean)) => {
-            format!("{}\nwrong {:.2}%, mean error {:.2}%", shown.name, wrong * 100.0, mean * 100.0)
-        }
-        None => shown.name.clone(),
-    };
-    let width = (rect.width() - 24.0).max(0.0);
-    let galley = painter.layout(text, FontId::proportional(13.0), Color32::WHITE, width);
-    let area = Rect::from_min_size(rect.min + vec2(8.0, 8.0), galley.size() + vec2(12.0, 8.0));
-    painter.rect_filled(area, 4.0, Color32::from_black_alpha(170));
-    painter.galley(area.min + vec2(6.0, 4.0), galley, Color32::WHITE);
 }
 
 /// Where in a rectangle a point of the window is, as shares of its sides.

@@ -90,7 +90,10 @@ impl App<'_> {
             driver.rest = u32::MAX;
         }
         // What is done while a scene is being opened would be lost.
-        let is_waiting = self.opening.is_some() && !driver.is_loading;
+        let is_waiting = self
+            .opening
+            .as_ref()
+            .is_some_and(|(.., since)| !driver.is_loading && since.elapsed() < TOO_LONG);
         while driver.is_ready() && !is_waiting {
             let Some(step) = driver.steps.front().cloned() else {
                 self.kept.outcome = Outcome::Closed;

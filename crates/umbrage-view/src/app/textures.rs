@@ -8,7 +8,7 @@ use umbrage_render::FrameTarget;
 /// The textures of the newest frame, as egui knows them.
 pub(super) struct Textures {
     state: egui_wgpu::RenderState,
-    pictures: Vec<Shown>,
+    pictures: [Option<Shown>; 2],
     map: Option<Shown>,
 }
 
@@ -28,47 +28,29 @@ impl Shown {
 
 impl Textures {
     pub(super) fn new(state: egui_wgpu::RenderState) -> Self {
-        Self { state, pictures: Vec::new(), map: None }
+        Self { state, pictures: [None, None], map: None }
     }
 
     /// Shows a frame from now on. A picture that could not be drawn stays as it was.
     pub(super) fn show(&mut self, frame: &Frame) {
-        for (i, picture) in frame.pictures.iter().enumerate() {
-            let Ok(drawn) = &picture.drawn else { continue };
-            let known = self.pictures.get(i).map(|shown| shown.id);
-            let shown = self.shown(&drawn.target, known, wgpu::FilterMode::Linear);
-            match self.pictures.get_mut(i) {
-                Some(place) => *place = shown,
-                None => self.pictures.push(shown),
-            }
+        for (i, place) in self.pictures.iter_mut().enumerate() {
+            let drawn = frame.pictures.get(i).and_then(|picture| picture.drawn.as_ref().ok());
+            let target = drawn.map(|drawn| &drawn.target);
+            replace(&self.state, place, target, wgpu::FilterMode::Linear);
         }
-        if let Some(target) = &frame.map {
-            let known = self.map.as_ref().map(|shown| shown.id);
-            self.map = Some(self.shown(target, known, wgpu::FilterMode::Nearest));
-        }
+        replace(&self.state, &mut self.map, frame.map.as_ref(), wgpu::FilterMode::Nearest);
     }
 
-    fn shown(
-        &self,
-        target: &Arc<FrameTarget>,
-        known: Option<TextureId>,
-        filter: wgpu::FilterMode,
-    ) -> Shown {
-        let (device, view) = (&self.state.device, target.shown_view());
-        let mut renderer = self.state.renderer.write();
-        let id = match known {
-            Some(id) => {
-                renderer.update_egui_texture_from_wgpu_texture(device, view, filter, id);
-                id
-            }
-            None => renderer.register_native_texture(device, view, filter),
-        };
-        Shown { id, target: Arc::clone(target) }
+    /// Shows nothing from now on.
+    pub(super) fn clear(&mut self) {
+        for place in self.pictures.iter_mut().chain([&mut self.map]) {
+            replace(&self.state, place, None, wgpu::FilterMode::Linear);
+        }
     }
 
     /// The picture of the first (0) or second (1) technique.
     pub(super) fn picture(&self, index: usize) -> Option<&Shown> {
-        self.pictures.get(index)
+        self.pictures.get(index)?.as_ref()
     }
 
     /// The picture of a map.
@@ -79,7 +61,30 @@ impl Textures {
 
 impl Drop for Textures {
     fn drop(&mut self) {
-        let mut renderer = self.state.renderer.write();
-        self.pictures.iter().chain(&self.map).for_each(|shown| renderer.free_texture(&shown.id));
+        self.clear();
     }
+}
+
+/// Shows another target, or none.
+fn replace(
+    state: &egui_wgpu::RenderState,
+    place: &mut Option<Shown>,
+    target: Option<&Arc<FrameTarget>>,
+    filter: wgpu::FilterMode,
+) {
+    let mut renderer = state.renderer.write();
+    let known = place.take().map(|shown| shown.id);
+    let Some(target) = target else {
+        known.iter().for_each(|id| renderer.free_texture(id));
+        return;
+    };
+    let (device, view) = (&state.device, target.shown_view());
+    let id = match known {
+        Some(id) => {
+            renderer.update_egui_texture_from_wgpu_texture(device, view, filter, id);
+            id
+        }
+        None => renderer.register_native_texture(device, view, filter),
+    };
+    *place = Some(Shown { id, target: Arc::clone(target) });
 }

@@ -7,8 +7,8 @@ use super::request::{Costs, DrawnPicture, Frame, Picture, Request, Shining};
 use super::truth::{SharedTruth, TruthJob};
 use super::{News, Reporter};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles, Technique};
 use umbrage_lab::{
@@ -21,7 +21,7 @@ use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
 
 /// The number of techniques' renderers that each picture keeps, so that changing to and fro is
 /// quick.
-const RENDERERS: usize = 3;
+const RENDERERS: usize = 2;
 
 /// Every so many frames, the time of a picture without lookups is measured.
 const BARE_EVERY: u64 = 16;
@@ -36,8 +36,12 @@ pub(super) struct Artist<'a> {
     buffers: &'a SceneBuffers,
     reporter: &'a Reporter,
     frames: &'a AtomicU64,
+    /// Number of frames that this artist has drawn.
+    drawn: u64,
     easels: Vec<Easel<'a>>,
     bare: Bare<'a>,
+    /// For pictures of maps.
+    map_targets: Targets,
     receivers: Vec<(Fit, Receivers)>,
     scout: Option<Scout<'a>>,
     posed: Option<Posed>,
@@ -59,8 +63,22 @@ struct Easel<'a> {
 struct Brush<'a> {
     options: ShadowOptions,
     renderer: Renderer<'a>,
-    /// Boxes around the casters that changed since its maps were drawn.
-    moved: Vec<Aabb>,
+    /// Boxes around the casters that changed since its maps were drawn; `None` if any may have.
+    moved: Option<Vec<Aabb>>,
+}
+
+impl Brush<'_> {
+    /// Notes that casters changed.
+    fn moved(&mut self, boxes: &[Aabb]) {
+        /// With more boxes than these, drawing whole maps costs no more than finding the parts.
+        const MOST: usize = 256;
+        if let Some(moved) = &mut self.moved {
+            moved.extend_from_slice(boxes);
+            if moved.len() > MOST {
+                self.moved = None;
+            }
+        }
+    }
 }
 
 /// What draws pictures without lookups.
@@ -68,7 +86,20 @@ struct Bare<'a> {
     renderer: Option<Renderer<'a>>,
     targets: Targets,
     timer: Option<Timer>,
-    ms: Option<f64>,
+    /// Number of the artist's frame at which it was measured, the picture's size, and the time,
+    /// milliseconds.
+    measured: Option<(u64, [u32; 2], f64)>,
+}
+
+impl Bare<'_> {
+    /// The time of such a picture for a frame of this number, milliseconds, if it was measured in
+    /// a view that is about the same.
+    fn of(&self, frame: u64, camera: &Camera) -> Option<f64> {
+        let is_near = |(at, size, _): &(u64, [u32; 2], f64)| {
+            frame - at <= BARE_EVERY && *size == camera.image()
+        };
+        self.measured.filter(is_near).map(|(.., ms)| ms)
+    }
 }
 
 /// Targets that nobody looks at any more are drawn into again.
@@ -102,13 +133,15 @@ impl<'a> Artist<'a> {
             buffers,
             reporter,
             frames,
+            drawn: 0,
             easels: Vec::new(),
             bare: Bare {
                 renderer: None,
                 targets: Targets::default(),
                 timer: Timer::new(gpu),
-                ms: None,
+                measured: None,
             },
+            map_targets: Targets::default(),
             receivers: Vec::new(),
             scout: None,
             posed: None,
@@ -123,11 +156,14 @@ impl<'a> Artist<'a> {
         }
         let rest = self.tracer().scene();
         let posed = self.posed.get_or_insert_with(|| Posed::new(rest));
-        let moved = posed.set(moment, self.gpu, self.buffers)?;
+        let moved = posed.set(moment, self.gpu, self.buffers);
         for brush in self.easels.iter_mut().flat_map(|easel| &mut easel.renderers) {
-            brush.moved.extend_from_slice(&moved);
+            match &moved {
+                Ok(moved) => brush.moved(moved),
+                Err(_) => brush.moved = None,
+            }
         }
-        Ok(())
+        moved.map(drop)
     }
 
     /// The scene in the pose of an animation, if it is not at rest.
@@ -147,15 +183,13 @@ impl<'a> Artist<'a> {
         let scene = self.in_motion().map_or(self.tracer().scene(), Posed::scene);
         let light = match request.light {
             Shining::Light(light) => light,
-            Shining::OfScene(index) => match scene.lights.get(index) {
-                Some(light) => light.light,
-                None => return,
-            },
+            // The window knows the lights of its scene, so there is one of this index.
+            Shining::OfScene(index) => scene.lights[index].light,
         };
         let planned_for = request.planned_for.unwrap_or(request.camera);
         let number = self.frames.fetch_add(1, Ordering::Relaxed) + 1;
-        let seen = self.seen(request.fit, &planned_for);
-        let (seen, problem) = match seen {
+        self.drawn += 1;
+        let (seen, problem) = match self.seen(request.fit, &planned_for) {
             Ok(seen) => (seen, None),
             Err(problem) => (None, Some(problem)),
         };
@@ -167,25 +201,25 @@ impl<'a> Artist<'a> {
             };
             pictures.push(Picture { technique: technique.clone(), drawn });
         }
+        // Maps of techniques that are no longer compared would only take memory.
+        self.easels.truncate(pictures.len());
         let map = request.map.and_then(|map| self.map(map));
-        let body = match request.planned_for {
-            Some(_) => {
-                self.easels.first().map_or_else(Vec::new, |e| e.planner.seen_edges().collect())
-            }
-            None => Vec::new(),
+        let body = match (request.wants_body, self.easels.first()) {
+            (true, Some(easel)) => easel.planner.seen_edges().collect(),
+            _ => Vec::new(),
         };
-        finish(self.gpu);
+        if let Err(e) = self.gpu.wait() {
+            self.reporter.tell(News::Refused(e.to_string()));
+        }
+        let bare_ms = self.bare.of(self.drawn, &request.camera);
         for (easel, picture) in self.easels.iter_mut().zip(&mut pictures) {
             easel.read_times(self.gpu);
             if let (Some(times), Ok(drawn)) = (&easel.times, &mut picture.drawn) {
-                drawn.costs.add_times(times, self.bare.ms);
+                drawn.costs.add_times(times, bare_ms);
             }
         }
-        if number % BARE_EVERY == 1 {
+        if self.drawn % BARE_EVERY == 1 {
             self.measure_bare(&request.camera, &light);
-        }
-        if let Err(e) = self.gpu.check() {
-            self.reporter.tell(News::Refused(e.to_string()));
         }
         let frame = Arc::new(Frame { request, number, light, pictures, map, body });
         self.last = Some((Arc::clone(&frame), false));
@@ -208,7 +242,7 @@ impl<'a> Artist<'a> {
         let (gpu, buffers, tracer) = (self.gpu, self.buffers, self.tracer());
         let posed = self.posed.as_ref().filter(|posed| !posed.is_at_rest());
         let receivers = match posed {
-            Some(posed) => posed.receivers(),
+            Some(posed) => posed.receivers(request.fit),
             None => receivers(&mut self.receivers, self.prepared, request.fit),
         };
         let bounds = receivers.bounds(seen);
@@ -225,12 +259,16 @@ impl<'a> Artist<'a> {
         let text = |e: umbrage_render::Error| e.to_string();
         // The rays know the scene at rest.
         renderer.leave_out(if posed.is_some() { Vec::new() } else { edge_on(&plan, tracer) });
-        let casters = if moved.is_empty() { Casters::Unmoved } else { Casters::MovedIn(moved) };
+        let casters = match moved.as_deref() {
+            None => Casters::Moved,
+            Some([]) => Casters::Unmoved,
+            Some(moved) => Casters::MovedIn(moved),
+        };
         let eye = request.camera.eye();
         let maps = renderer
             .draw_maps_seen_from(eye, &plan, casters, timer.as_deref_mut())
             .map_err(text)?;
-        moved.clear();
+        *moved = Some(Vec::new());
         let shading = Shading { camera: &request.camera, light, light_index: 0 };
         let picture = match request.overlay {
             None => renderer.frame(&shading, &target, timer),
@@ -272,7 +310,8 @@ impl<'a> Artist<'a> {
         let renderer = &mut easel.renderers.last_mut()?.renderer;
         let [width, height] = renderer.shadows().place(map)?.size;
         let most = width.max(height).div_ceil(MAP_SIDE);
-        let target = easel.targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
+        let target =
+            self.map_targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
         renderer.show_map(map, &target).ok()?;
         Some(target)
     }
@@ -294,58 +333,48 @@ impl<'a> Artist<'a> {
             .draw_maps(&plan, Casters::Unmoved, None)
             .and_then(|_| renderer.frame(&shading, &target, Some(timer)));
         if drawn.is_ok() {
-            finish(gpu);
-            let times = timer.try_read(gpu).ok().flatten();
-            bare.ms = times.map(|times| times.picture_ms).or(bare.ms);
+            let times = timer.read(gpu).ok();
+            bare.measured = times.map(|times| (self.drawn, camera.image(), times.picture_ms));
         }
     }
 
     /// Begins what takes longer than a frame, as long as nothing new is requested.
     pub(super) fn rest(&mut self, truths: &Mailbox<TruthJob>, is_moving: &dyn Fn() -> bool) {
-        let Some((frame, is_asked_for)) = &mut self.last else { return };
-        if *is_asked_for || !frame.request.wants_truth || frame.request.planned_for.is_some() {
+        let Some((frame, is_done)) = &mut self.last else { return };
+        if std::mem::replace(is_done, true) {
             return;
         }
-        *is_asked_for = true;
         let frame = Arc::clone(frame);
-        let camera = frame.request.camera;
+        let Request { camera, wants_truth, planned_for, light_size, .. } = frame.request;
+        if self.bare.of(self.drawn, &camera).is_none() {
+            self.measure_bare(&camera, &frame.light);
+        }
+        if !wants_truth || planned_for.is_some() {
+            return;
+        }
         let picture = SharedTruth::new(frame.number, &camera);
         self.reporter.tell(News::Truth(picture.clone()));
-        let light_size = frame.request.light_size;
-        let posed = self.posed.as_ref().and_then(Posed::shared);
+        let posed = self.posed.as_ref().and_then(|posed| posed.shared(self.tracer().scene()));
         truths.put(TruthJob { camera, light: frame.light, light_size, posed, picture });
         let shading = Shading { camera: &camera, light: &frame.light, light_index: 0 };
         let height = camera.image()[1];
-        for (technique, picture) in frame.pictures.iter().enumerate() {
-            if picture.drawn.is_err() {
-                continue;
-            }
+        for (technique, _) in frame.pictures.iter().enumerate().filter(|(_, p)| p.drawn.is_ok()) {
             let Some(brush) = self.easels[technique].renderers.last_mut() else { continue };
-            let mut values = Vec::with_capacity((camera.image()[0] * height) as usize);
             for first in (0..height).step_by(ROWS as usize) {
                 if is_moving() {
                     return;
                 }
                 let rows = first..height.min(first + ROWS);
                 match brush.renderer.samples(&shading, rows, 1, false) {
-                    Ok(samples) => values.extend(samples.iter().map(|s| s.visibility)),
+                    Ok(samples) => {
+                        let values = samples.iter().map(|s| s.visibility).collect();
+                        let rows = Visibility { frame: frame.number, technique, values };
+                        self.reporter.tell(News::Visibility(rows));
+                    }
                     Err(e) => return self.reporter.tell(News::Refused(e.to_string())),
                 }
-                let values = values.clone();
-                let visibility = Visibility { frame: frame.number, technique, values };
-                self.reporter.tell(News::Visibility(visibility));
             }
         }
-    }
-}
-
-/// The options of a technique's lookups.
-pub(super) fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
-    ShadowOptions {
-        filter: technique.filter,
-        buffers: LookupBuffers::for_technique(technique, 1),
-        fades,
-        ..ShadowOptions::default()
     }
 }
 
@@ -366,18 +395,13 @@ fn receivers<'r>(
     &known[index].1
 }
 
-/// Waits until the device has done all work. While it waits, other threads may submit more: a wait
-/// of the device's own would keep them from that.
-fn finish(gpu: &Gpu) {
-    const LOOK: Duration = Duration::from_micros(500);
-    let is_done = Arc::new(AtomicBool::new(false));
-    let done = Arc::clone(&is_done);
-    gpu.queue().on_submitted_work_done(move || done.store(true, Ordering::Release));
-    while !is_done.load(Ordering::Acquire) && gpu.lost().is_none() {
-        if gpu.device().poll(wgpu::PollType::Poll).is_err() {
-            return;
-        }
-        std::thread::sleep(LOOK);
+/// The options of a technique's lookups.
+pub(super) fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
+    ShadowOptions {
+        filter: technique.filter,
+        buffers: LookupBuffers::for_technique(technique, 1),
+        fades,
+        ..ShadowOptions::default()
     }
 }
 
@@ -416,7 +440,7 @@ impl<'a> Easel<'a> {
             Some(known) => self.renderers.remove(known),
             None => {
                 let renderer = Renderer::new(gpu, buffers, &options).map_err(|e| e.to_string())?;
-                Brush { options, renderer, moved: Vec::new() }
+                Brush { options, renderer, moved: None }
             }
         };
         if self.renderers.len() >= RENDERERS {

@@ -27,3 +27,28 @@ pub(crate) fn errors(truth: &TruthPicture, technique: &Visibility, is_soft: bool
     }
     Some(tally)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_known_of_both_counts() {
+        let truth = TruthPicture {
+            frame: 3,
+            sharp: vec![0.0, 1.0, f32::NAN, 1.0, 0.0],
+            soft: vec![0.5, 1.0, f32::NAN, 1.0, 0.0],
+            counts: vec![true, true, true, false, true],
+            ..TruthPicture::default()
+        };
+        // The last pixel's row is not read yet.
+        let visibility =
+            |frame| Visibility { frame, technique: 0, values: vec![1.0, 1.0, 1.0, 0.0] };
+        let sharp = errors(&truth, &visibility(3), false).unwrap();
+        assert_eq!((sharp.counted, sharp.false_light), (2, 1));
+        assert_eq!(sharp.mean_abs_error(), Some(0.5));
+        let soft = errors(&truth, &visibility(3), true).unwrap();
+        assert_eq!((soft.counted, soft.wrong_fraction()), (2, Some(0.0)));
+        assert_eq!(errors(&truth, &visibility(4), false), None, "another frame");
+    }
+}

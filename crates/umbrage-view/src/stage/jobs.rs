@@ -6,6 +6,7 @@ use super::mailbox::Mailbox;
 use super::request::{Frame, Request};
 use super::truth::{SharedTruth, TruthJob, trace};
 use super::{News, Reporter};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -72,7 +73,7 @@ pub(super) fn do_jobs(
             Err(_) => return,
         };
         let worker = Worker { prepared, reporter, is_given_up: &is_given_up };
-        let done = match job {
+        let done = catch_unwind(AssertUnwindSafe(|| match job {
             Job::Measure { techniques, camera, light, light_size } => {
                 worker.measure(&techniques, camera, light, light_size)
             }
@@ -80,7 +81,8 @@ pub(super) fn do_jobs(
             Job::Turntable { technique, cameras, light, folder } => {
                 worker.turntable(&technique, &cameras, &light, &folder)
             }
-        };
+        }));
+        let done = done.unwrap_or_else(|_| Err("the program failed".into()));
         reporter.tell(News::JobDone(done));
     }
 }
@@ -142,7 +144,7 @@ impl Worker<'_, '_> {
         let start = Instant::now();
         let plan = plan(technique, view.camera(), view.light(), &bounds).map_err(text)?;
         let plan_ms = milliseconds(start);
-        let frame_ms = self.frame_ms(technique, view, &plan)? - bare_ms;
+        let frame_ms = (self.frame_ms(technique, view, &plan)? - bare_ms).max(0.0);
         let mut executor =
             self.prepared.render().executor(technique.technique(), false).map_err(text)?;
         executor.render(&plan, &|_| {}).map_err(text)?;

@@ -125,8 +125,15 @@ impl Stage {
         }
     }
 
+    /// Whether a scene is being opened.
+    pub(crate) fn is_opening(&self) -> bool {
+        self.coming.is_some()
+    }
+
     /// Gives up the scene that is being opened.
     pub(crate) fn cancel(&mut self) {
+        // Its news are then those of a scene that nobody knows.
+        self.scenes += 1;
         self.coming = None;
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use umbrage::Aabb;
-use umbrage_lab::Receivers;
+use umbrage_lab::{Fit, Receivers};
 use umbrage_render::{Gpu, SceneBuffers};
 use umbrage_scene::Scene;
 
@@ -11,12 +11,15 @@ pub(super) struct Posed {
     scene: Scene,
     moment: Option<(usize, f64)>,
     receivers: Receivers,
+    in_box: Receivers,
 }
 
 impl Posed {
     pub(super) fn new(rest: &Scene) -> Self {
-        let receivers = Receivers::around_instances(rest);
-        Self { scene: rest.clone(), moment: None, receivers }
+        let scene = without_textures(rest);
+        let receivers = Receivers::around_instances(&scene);
+        let in_box = Receivers::in_box(&scene);
+        Self { scene, moment: None, receivers, in_box }
     }
 
     /// Whether the scene is at rest, as it was opened.
@@ -24,17 +27,24 @@ impl Posed {
         self.moment.is_none()
     }
 
+    /// The scene in this pose, without its textures.
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The scene in this pose, for a thread of its own.
-    pub(super) fn shared(&self) -> Option<Arc<Scene>> {
-        (!self.is_at_rest()).then(|| Arc::new(self.scene.clone()))
+    /// The scene in this pose with the textures of `rest`, for a thread of its own; `None` if it is
+    /// at rest.
+    pub(super) fn shared(&self, rest: &Scene) -> Option<Arc<Scene>> {
+        let whole = || Scene { textures: rest.textures.clone(), ..self.scene.clone() };
+        (!self.is_at_rest()).then(|| Arc::new(whole()))
     }
 
-    pub(super) fn receivers(&self) -> &Receivers {
-        &self.receivers
+    /// What maps are fitted to. Boxes around surfaces are those around instances.
+    pub(super) fn receivers(&self, fit: Fit) -> &Receivers {
+        match fit {
+            Fit::Box => &self.in_box,
+            Fit::Surfaces | Fit::Seen => &self.receivers,
+        }
     }
 
     /// Poses the scene, and moves what the device has of it. Gives the boxes around casters that
@@ -52,7 +62,25 @@ impl Posed {
         let (clip, seconds) = moment.map_or((None, 0.0), |(clip, seconds)| (Some(clip), seconds));
         let moved = self.scene.pose(clip, seconds);
         self.receivers = Receivers::around_instances(&self.scene);
+        self.in_box = Receivers::in_box(&self.scene);
         buffers.pose(gpu, &self.scene, &moved).map_err(|e| e.to_string())
+    }
+}
+
+/// A copy of a scene for its shape alone: textures are the largest part of many.
+fn without_textures(scene: &Scene) -> Scene {
+    Scene {
+        name: scene.name.clone(),
+        meshes: scene.meshes.clone(),
+        instances: scene.instances.clone(),
+        materials: scene.materials.clone(),
+        cameras: scene.cameras.clone(),
+        lights: scene.lights.clone(),
+        nodes: scene.nodes.clone(),
+        roles: scene.roles.clone(),
+        sky: scene.sky,
+        animations: scene.animations.clone(),
+        ..Scene::default()
     }
 }
 
@@ -69,7 +97,7 @@ pub(super) fn boxes_in_motion(scene: &Scene) -> Vec<Aabb> {
         return Vec::new();
     }
     let moments = (MOST_MOMENTS / clips.len() as u32).clamp(1, MOMENTS);
-    let mut posed = scene.clone();
+    let mut posed = without_textures(scene);
     let mut boxes = vec![Aabb::EMPTY; scene.instances.len()];
     for (clip, length) in clips.iter().map(|clip| clip.duration_s).enumerate() {
         for i in 0..moments {

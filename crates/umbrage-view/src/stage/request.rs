@@ -32,6 +32,8 @@ pub(crate) struct Request {
     pub(crate) wants_truth: bool,
     /// The size of the light for the truth of soft techniques.
     pub(crate) light_size: Option<LightSize>,
+    /// Whether the edges of body B are wanted.
+    pub(crate) wants_body: bool,
 }
 
 /// A light by its value, or by its index in the scene, where an animation may move it.
@@ -86,7 +88,7 @@ pub(crate) struct Frame {
     /// The map that was asked for.
     pub(crate) map: Option<Arc<FrameTarget>>,
     /// The edges of body B: what the planned view sees of the receivers, world space, metres. Empty
-    /// unless the plan was made for another camera.
+    /// unless they were wanted.
     pub(crate) body: Vec<[DVec3; 2]>,
 }
 
@@ -148,6 +150,8 @@ pub(crate) struct SceneInfo {
     /// The light to begin with, and the word of the scene's light if it is one.
     pub(crate) light: Light,
     pub(crate) light_name: Option<String>,
+    /// The clip to begin with, by its place among the clips.
+    pub(crate) clip: Option<usize>,
     /// Number of triangles as drawn.
     pub(crate) triangles: u64,
 }

@@ -7,6 +7,7 @@ use super::posed::boxes_in_motion;
 use super::request::{Request, SceneInfo};
 use super::truth::{TruthJob, trace_jobs};
 use super::{News, Reporter};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -24,6 +25,8 @@ pub(crate) struct SceneToOpen {
     /// A path, or the name of a built-in scene.
     pub(crate) name: String,
     pub(crate) changes: SceneOptions,
+    /// A word that chooses the animation to begin with.
+    pub(crate) clip: Option<String>,
     /// Whether alpha masks are ignored.
     pub(crate) opaque: bool,
     pub(crate) view: ViewOptions,
@@ -43,8 +46,22 @@ pub(super) fn run(
     jobs: Receiver<Job>,
     frames: &AtomicU64,
 ) {
-    if let Err(problem) = open_and_draw(scene, gpu, reporter, requests, jobs, frames) {
-        reporter.tell(News::Failed(problem));
+    let drawn = catch_unwind(AssertUnwindSafe(|| {
+        open_and_draw(scene, gpu, reporter, requests, jobs, frames)
+    }));
+    match drawn {
+        Ok(Ok(())) => {}
+        Ok(Err(problem)) => reporter.tell(News::Failed(problem)),
+        Err(_) => reporter.tell(News::Failed(format!("{}: the program failed", scene.name))),
+    }
+}
+
+/// Closes a mailbox when it is dropped.
+struct Closing<'a, T>(&'a Mailbox<T>);
+
+impl<T> Drop for Closing<'_, T> {
+    fn drop(&mut self) {
+        self.0.close();
     }
 }
 
@@ -65,8 +82,13 @@ fn open_and_draw(
         }
     };
     stage("reading")?;
-    let SceneToOpen { name, changes, opaque, view, light } = to_open;
+    let SceneToOpen { name, changes, clip, opaque, view, light } = to_open;
     let scene = open_scene(Path::new(""), name, changes).map_err(|e| e.to_string())?;
+    let choices = scene.animation_choices();
+    let find = |word: &String| {
+        choices.find(word).ok_or_else(|| format!("the scene has no animation `{word}`"))
+    };
+    let clip = clip.as_ref().map(find).transpose()?;
     stage("preparing")?;
     let executors = Executors::with_gpu(gpu);
     let prepared = PreparedScene::new(&scene, &executors, *opaque, Fit::Surfaces)
@@ -94,6 +116,7 @@ fn open_and_draw(
         view_name: chosen.name,
         light: chosen_light.light,
         light_name: chosen_light.name,
+        clip,
         triangles: scene.drawn_triangles(),
     };
     let mut artist = Artist::new(&prepared, reporter, frames).ok_or("there is no GPU")?;
@@ -101,7 +124,9 @@ fn open_and_draw(
     let truths = Mailbox::<TruthJob>::default();
     std::thread::scope(|scope| {
         let tracer = prepared.render().tracer();
-        scope.spawn(|| trace_jobs(tracer, &truths, || reporter.tell(News::TruthGrew)));
+        // However this ends, the thread that waits for truths to trace ends, too.
+        let closing = Closing(&truths);
+        scope.spawn(|| trace_jobs(tracer, &truths, frames, || reporter.tell(News::TruthGrew)));
         let prepared = &prepared;
         scope.spawn(move || do_jobs(prepared, &jobs, requests, reporter));
         let mut rests = true;
@@ -118,7 +143,7 @@ fn open_and_draw(
                 Mail::Closed => break,
             }
         }
-        truths.close();
+        drop(closing);
     });
     Ok(())
 }
