@@ -147,15 +147,16 @@ impl App<'_> {
     pub(super) fn keys(&mut self, context: &egui::Context, seconds: f64) {
         let is_typing = context.text_edit_focused();
         let (pressed, modifiers) = context.input(|i| {
+            // What is held down may have changed by the end of a long frame.
             let pressed = |event: &egui::Event| match event {
-                egui::Event::Key { key, pressed: true, .. } => Some(*key),
+                egui::Event::Key { key, pressed: true, modifiers, .. } => Some((*key, *modifiers)),
                 _ => None,
             };
-            (i.events.iter().filter_map(pressed).collect::<Vec<Key>>(), i.modifiers)
+            (i.events.iter().filter_map(pressed).collect::<Vec<_>>(), i.modifiers)
         });
         let focus = context.memory(egui::Memory::focused);
-        for key in pressed {
-            if let Some(action) = self.shortcut(key, modifiers, is_typing, focus) {
+        for (key, held) in pressed {
+            if let Some(action) = self.shortcut(key, held, is_typing, focus) {
                 self.act(context, action);
             }
         }
@@ -182,7 +183,8 @@ impl App<'_> {
             }
             Key::P if modifiers.command => return Some(Action::Save(free("umbrage-view", ".png"))),
             Key::Escape => {
-                if self.kept.message.take().is_none()
+                let shown = self.kept.message.take().filter(|message| !message.is_over());
+                if shown.is_none()
                     && let Some(panel) =
                         self.kept.shown.panels.iter().rev().find(|&&p| p != Panel::Controls)
                 {

@@ -5,6 +5,8 @@ use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use umbrage::visibility::LightSize;
+use umbrage::{Camera, Light};
 use umbrage_measure::{Image, Rgb, Tally, difference_map};
 
 /// The costs of the last frames.
@@ -110,7 +112,9 @@ impl Judged {
         self.version += 1;
         let truth = truth.lock();
         for (i, picture) in frame.pictures.iter().enumerate().take(2) {
+            // The first rows alone would tell of the upper part of the picture.
             let visibility = self.visibility[i].as_ref();
+            let visibility = visibility.filter(|v| v.values.len() == truth.sharp.len());
             self.tallies[i] =
                 visibility.and_then(|v| errors(&truth, v, picture.technique.is_soft()));
         }
@@ -139,15 +143,15 @@ impl Judged {
         Some(f64::from(truth.depth[known])).filter(|depth| depth.is_finite())
     }
 
-    /// Whether the truth is traced and all that is known is counted.
-    pub(super) fn is_done(&self) -> bool {
-        self.truth.as_ref().is_some_and(|truth| {
-            let truth = truth.lock();
-            let pixels = truth.sharp.len();
-            let is_read =
-                |v: &Option<Visibility>| v.as_ref().is_none_or(|v| v.values.len() == pixels);
-            truth.is_done() && self.visibility[0].is_some() && self.visibility.iter().all(is_read)
-        }) && !self.is_stale
+    /// Whether the truth of a frame is traced and all that is known is counted.
+    pub(super) fn is_done(&self, frame: &Frame) -> bool {
+        let Some(truth) = &self.truth else { return false };
+        let truth = truth.lock();
+        let is_read = |i: usize| {
+            let values = self.visibility[i].as_ref().map_or(0, |v| v.values.len());
+            frame.pictures[i].drawn.is_err() || values == truth.sharp.len()
+        };
+        truth.is_done() && !self.is_stale && (0..frame.pictures.len().min(2)).all(is_read)
     }
 
     /// The truth as a texture.
@@ -245,6 +249,8 @@ fn set(
 #[derive(Default)]
 pub(super) struct Presets {
     pub(super) measured: Vec<Measurement>,
+    /// The view and the light that they were measured in.
+    pub(super) view: Option<(Camera, Light, Option<LightSize>)>,
 }
 
 impl Presets {

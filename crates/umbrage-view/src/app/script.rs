@@ -5,6 +5,7 @@ use super::controls::{Tipped, tipped_id};
 use crate::Outcome;
 use crate::action::Action;
 use crate::script::{Command, Step, Wait};
+use crate::stage::Frame;
 use egui::{Context, Event, PointerButton, Pos2, RawInput, ViewportCommand, vec2};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -171,7 +172,10 @@ impl App<'_> {
                         self.stage.frames() >= frames + count
                     }
                     Wait::Ready => self.is_up_to_date() && began.elapsed().as_millis() > 50,
-                    Wait::Truth => self.is_up_to_date() && self.judged.is_done(),
+                    Wait::Truth => {
+                        let is_done = |frame: &Arc<Frame>| self.judged.is_done(frame);
+                        self.is_up_to_date() && self.frame.as_ref().is_some_and(is_done)
+                    }
                     Wait::Jobs => self.job.is_none(),
                 };
                 if is_over { Done::Yes } else { Done::NotYet }

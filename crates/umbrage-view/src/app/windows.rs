@@ -132,6 +132,13 @@ impl App<'_> {
         if button.tip("Trace the truth and measure all six, beside the frames (P).").clicked() {
             actions.push(Action::TryThese);
         }
+        let now = self
+            .frame
+            .as_ref()
+            .map(|frame| (frame.request.camera, frame.light, self.kept.settings.light_size));
+        if !self.presets.measured.is_empty() && self.presets.view != now {
+            ui.label(RichText::new("measured in another view or light").weak());
+        }
         egui::ScrollArea::horizontal().show(ui, |ui| {
             Grid::new("presets").striped(true).num_columns(6).show(ui, |ui| {
                 for (title, tip) in [
@@ -159,7 +166,7 @@ impl App<'_> {
                             ui.label("–");
                         }
                         Some(Err(problem)) => {
-                            ui.label(problem);
+                            ui.label("not possible here").on_hover_text(problem);
                         }
                         Some(Ok(worth)) => {
                             let percent = |v: Option<f64>| {
@@ -318,6 +325,7 @@ impl App<'_> {
         let (camera, light) = (frame.request.camera, frame.light);
         let light_size = self.kept.settings.light_size;
         self.presets.measured.clear();
+        self.presets.view = Some((camera, light, light_size));
         let job = Job::Measure { techniques, camera, light, light_size };
         self.begin("measuring", job);
     }
