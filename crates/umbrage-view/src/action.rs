@@ -167,7 +167,9 @@ impl Action {
             "freeze" => Self::Freeze(switch(verb, rest)?),
             "count-errors" => Self::CountErrors(switch(verb, rest)?),
             "panel" => {
-                let (name, state) = rest.rsplit_once(char::is_whitespace).unwrap_or((rest, "on"));
+                let is_state = |(_, state): &(&str, &str)| matches!(*state, "on" | "off");
+                let told = rest.rsplit_once(char::is_whitespace).filter(is_state);
+                let (name, state) = told.unwrap_or((rest, "on"));
                 Self::Panel(chosen(verb, name.trim(), &Panel::ALL)?, switch(verb, state)?)
             }
             "clip" => Self::Clip(numbers::<1>(verb, rest)?[0] as usize),
@@ -251,6 +253,7 @@ mod tests {
         assert_eq!(parse("compare side by side"), Action::Compare(Compare::Beside));
         assert_eq!(parse("panel shadow map off"), Action::Panel(Panel::Map, false));
         assert_eq!(parse("panel theory on"), Action::Panel(Panel::Theory, true));
+        assert_eq!(parse("panel light space"), Action::Panel(Panel::LightSpace, true));
         let eye = DVec3::new(1.0, 2.0, -300.0);
         assert_eq!(parse(" stand 1, 2,-3e2 0 0 0 "), Action::Stand([eye, DVec3::ZERO]));
         assert_eq!(parse("turntable 36 my turn"), Action::Turntable(36, "my turn".into()));

@@ -138,7 +138,7 @@ impl App<'_> {
     fn bottom(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
         let mut is_closed = false;
-        ui.horizontal_wrapped(|ui| {
+        ui.horizontal(|ui| {
             if let Some((what, share)) = &self.job {
                 ui.add(ProgressBar::new(*share).desired_width(120.0));
                 ui.label(what);
@@ -149,8 +149,10 @@ impl App<'_> {
                     true => ui.visuals().error_fg_color,
                     false => ui.visuals().strong_text_color(),
                 };
-                ui.label(RichText::new(&message.text).color(color));
                 is_closed = ui.small_button("×").tip("Take this message away (Escape).").clicked();
+                // One line, so that a long message does not change the size of the picture.
+                let line = RichText::new(&message.text).color(color);
+                ui.add(egui::Label::new(line).truncate());
                 ui.separator();
                 context.request_repaint_after_secs(1.0);
             }
@@ -195,6 +197,7 @@ impl App<'_> {
             .selected_text(shown)
             .width(ui.available_width() - 16.0)
             .height(400.0)
+            .truncate()
             .show_ui(ui, |ui| {
                 for builtin in umbrage_scene::builtins() {
                     let is_shown = builtin.name == self.kept.settings.scene;
@@ -227,7 +230,8 @@ impl App<'_> {
         let Some(info) = self.info.clone() else { return };
         ui.label(format!("{} triangles drawn", thousands(info.triangles)));
         if !info.notices.is_empty() {
-            let title = format!("{} notices", info.notices.len());
+            let count = info.notices.len();
+            let title = if count == 1 { "1 notice".into() } else { format!("{count} notices") };
             let header = CollapsingHeader::new(title).show(ui, |ui| {
                 for notice in &info.notices {
                     ui.label(RichText::new(notice).small());
@@ -384,10 +388,11 @@ impl App<'_> {
                 }
             }
             LightSetting::Hour(mut hour) => {
-                let slider =
-                    Slider::new(&mut hour, 4.5..=19.5).text("hour").custom_formatter(|h, _| {
-                        format!("{:02}:{:02}", h.trunc(), (h.fract() * 60.0).trunc())
-                    });
+                let slider = Slider::new(&mut hour, 4.5..=19.5).text("hour");
+                let slider = slider.custom_parser(hours).custom_formatter(|hours, _| {
+                    let minutes = (hours * 60.0).round() as u32;
+                    format!("{:02}:{:02}", minutes / 60, minutes % 60)
+                });
                 if ui.add(slider).tip("The time of day by the sun; 12 is noon.").changed() {
                     actions.push(Action::Hour(hour));
                 }
@@ -557,6 +562,17 @@ impl App<'_> {
 /// The action that sets a sun.
 pub(super) fn sun_action(sun: Sun) -> Action {
     Action::Sun { azimuth_deg: sun.azimuth_deg, elevation_deg: sun.elevation_deg }
+}
+
+/// The hours of a time such as `16:45` or `16.75`.
+fn hours(text: &str) -> Option<f64> {
+    match text.trim().split_once(':') {
+        Some((hours, minutes)) => {
+            let [hours, minutes] = [hours, minutes].map(|part| part.trim().parse::<f64>().ok());
+            Some(hours? + minutes? / 60.0)
+        }
+        None => text.trim().parse().ok(),
+    }
 }
 
 /// A path in the process's folder at which nothing is yet: `name.png`, `name-2.png` and so on.

@@ -20,7 +20,10 @@ pub(super) struct Line {
 impl Line {
     /// Body B has many edges, which should not hide the others.
     fn stroke(&self) -> Stroke {
-        Stroke::new(if self.color == BODY { 1.0 } else { 2.0 }, self.color)
+        match self.color == BODY {
+            true => Stroke::new(1.0, self.color.gamma_multiply(0.6)),
+            false => Stroke::new(2.0, self.color),
+        }
     }
 }
 

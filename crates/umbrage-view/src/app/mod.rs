@@ -274,6 +274,8 @@ impl<'k> App<'k> {
         self.path.clone_from(&settings.scene);
         self.drafts = [0, 1].map(|i| technique::Draft::new(&settings.techniques[i]));
         self.kept.settings = settings;
+        // What was said was about another scene, unless it is the loss of a device.
+        self.kept.message.take_if(|_| kind != Kind::Again);
         let unsaid = info.notices.len();
         if unsaid > 0 {
             let more =

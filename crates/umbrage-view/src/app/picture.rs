@@ -119,6 +119,9 @@ impl App<'_> {
         let errors = shown.tally.and_then(|t| Some((t.wrong_fraction()?, t.mean_abs_error()?)));
         match (self.judged.state(), errors) {
             (Some((Some(problem), _)), _) => text += &format!("\nno truth: {problem}"),
+            (Some((None, share)), None) if share < 1.0 => {
+                text += &format!("\n{:.0}% traced", share * 100.0);
+            }
             (Some((None, share)), Some((wrong, mean))) => {
                 let [wrong, mean] = [wrong, mean].map(|v| v * 100.0);
                 text += &format!("\nwrong {wrong:.2}%, mean error {mean:.2}%");
@@ -182,9 +185,11 @@ impl App<'_> {
                 }
                 "no truth is traced while the plan is frozen".to_owned()
             }
-            (None, None, None) if self.info.is_none() => {
-                "no scene; drop a .glb file here".to_owned()
+            (None, None, None) if self.info.is_some() => "drawing".to_owned(),
+            (None, None, Some(frame)) if is_unlit(frame) => {
+                "the light reaches nothing that is seen".to_owned()
             }
+            (None, None, None) => "no scene; drop a .glb file here".to_owned(),
             _ => return,
         };
         let font = FontId::proportional(16.0);
@@ -193,6 +198,14 @@ impl App<'_> {
         painter.rect_filled(area, 6.0, Color32::from_black_alpha(200));
         painter.galley(area.min + vec2(12.0, 8.0), galley, Color32::WHITE);
     }
+}
+
+/// Whether a light's maps are all empty.
+fn is_unlit(frame: &crate::stage::Frame) -> bool {
+    drawn(frame, 0).is_some_and(|drawn| {
+        let maps = &drawn.plan.maps;
+        !maps.is_empty() && maps.iter().all(umbrage::ShadowMap::is_empty)
+    })
 }
 
 /// The first or second picture of a frame, if it could be drawn.

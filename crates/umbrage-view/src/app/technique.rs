@@ -10,13 +10,15 @@ use umbrage_lab::NamedTechnique;
 /// show what the text says, and change it.
 pub(super) struct Draft {
     pub(super) text: String,
+    /// The last text that was a technique, which the controls show while the text is none.
+    valid: String,
     /// The completion that is chosen in the list, if the list is shown.
     chosen: Option<usize>,
 }
 
 impl Draft {
     pub(super) fn new(text: &str) -> Self {
-        Self { text: text.to_owned(), chosen: None }
+        Self { text: text.to_owned(), valid: text.to_owned(), chosen: None }
     }
 
     /// Shows the editor. Gives the text of a technique if it changed to one.
@@ -24,14 +26,15 @@ impl Draft {
         let before = self.text.clone();
         ui.push_id(id, |ui| {
             self.text_field(ui);
-            let parsed: Result<NamedTechnique, _> = self.text.parse();
-            match parsed {
-                Err(problem) => {
+            let problem = self.text.parse::<NamedTechnique>().err();
+            match &problem {
+                Some(problem) => {
                     let color = ui.visuals().error_fg_color;
                     ui.label(RichText::new(problem.to_string()).color(color));
                 }
-                Ok(_) => self.controls(ui),
+                None => self.valid.clone_from(&self.text),
             }
+            ui.add_enabled_ui(problem.is_none(), |ui| self.controls(ui));
         });
         let is_technique = self.text.parse::<NamedTechnique>().is_ok();
         (self.text != before && is_technique).then(|| self.text.clone())
@@ -136,7 +139,7 @@ impl Draft {
     }
 
     fn slot(&mut self, ui: &mut Ui, slot: Slot, name: &str) {
-        let text = self.text.clone();
+        let text = self.valid.clone();
         let current = written(&text, slot);
         let shown = current.as_ref().map_or("one map".to_owned(), |w| w.word.to_string());
         ui.horizontal(|ui| {

@@ -107,8 +107,11 @@ impl TruthPicture {
 /// The distances between the pixels of the levels, of which each contains those before.
 const STEPS: [u32; 4] = [8, 4, 2, 1];
 
-/// About how many pixels are traced before others may see them, or another job may begin.
+/// About how many rays are cast before others may see what they found, or another job may begin.
 const CHUNK: u32 = 1 << 13;
+
+/// About how many rays a pixel takes with a light that has a size.
+const AREA_RAYS: u32 = 64;
 
 /// Traces the jobs that come, until there are none any more. A job ends early if another one comes,
 /// or if the number of the newest frame is no longer that of its own. `grew` is called whenever
@@ -172,7 +175,8 @@ pub(super) fn trace(
     let mut known = 0;
     for step in STEPS {
         let rows: Vec<u32> = (0..height).step_by(step as usize).collect();
-        for rows in rows.chunks((CHUNK * step / width).max(1) as usize) {
+        let rays = if area.is_some() { AREA_RAYS } else { 1 };
+        for rows in rows.chunks((CHUNK * step / (width * rays)).max(1) as usize) {
             if is_out_of_date() {
                 return Ok(());
             }
