@@ -64,7 +64,6 @@ pub(crate) struct Windows {
 pub(crate) struct Scripted {
     pub(crate) code: i32,
     pub(crate) stderr: String,
-    pub(crate) took: Duration,
     folder: PathBuf,
 }
 
@@ -116,7 +115,7 @@ impl Windows {
         for word in ["panicked", "validation", "refused", "error:"] {
             assert!(!stderr.to_lowercase().contains(word), "{word}:\n{stderr}");
         }
-        Scripted { code, stderr, took: began.elapsed(), folder: self.folder.clone() }
+        Scripted { code, stderr, folder: self.folder.clone() }
     }
 
     /// Goes through a script that must succeed.

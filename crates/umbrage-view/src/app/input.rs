@@ -156,13 +156,13 @@ impl App<'_> {
         let is_typing = context.text_edit_focused();
         let (pressed, modifiers) = context.input(|i| {
             let pressed = |event: &egui::Event| match event {
-                egui::Event::Key { key, pressed: true, .. } => Some(*key),
+                egui::Event::Key { key, pressed: true, modifiers, .. } => Some((*key, *modifiers)),
                 _ => None,
             };
-            (i.events.iter().filter_map(pressed).collect::<Vec<Key>>(), i.modifiers)
+            (i.events.iter().filter_map(pressed).collect::<Vec<_>>(), i.modifiers)
         });
-        for key in pressed {
-            if let Some(action) = self.shortcut(key, modifiers, is_typing) {
+        for (key, modifiers) in pressed {
+            if let Some(action) = self.shortcut(context, key, modifiers, is_typing) {
                 self.act(context, action);
             }
         }
@@ -175,7 +175,13 @@ impl App<'_> {
         }
     }
 
-    fn shortcut(&mut self, key: Key, modifiers: Modifiers, is_typing: bool) -> Option<Action> {
+    fn shortcut(
+        &mut self,
+        context: &egui::Context,
+        key: Key,
+        modifiers: Modifiers,
+        is_typing: bool,
+    ) -> Option<Action> {
         match key {
             Key::F1 => return Some(Action::Panel(Panel::Help, !self.is_shown(Panel::Help))),
             Key::S if modifiers.command => {
@@ -194,6 +200,8 @@ impl App<'_> {
             _ if is_typing || modifiers.command || modifiers.ctrl || modifiers.alt => return None,
             _ => {}
         }
+        let focused = context.memory(|memory| memory.focused());
+        let is_on_control = focused.is_some() && focused != self.picture_id;
         let settings = &self.kept.settings;
         let overlay = |i: usize| Some(Action::Overlay(OverlayKind::ALL[i].0));
         match key {
@@ -211,7 +219,10 @@ impl App<'_> {
             Key::P => Some(Action::TryThese),
             Key::T => Some(Action::Panel(Panel::Theory, !self.is_shown(Panel::Theory))),
             Key::H => Some(Action::Hour(15.0)),
-            Key::Space if settings.clip.is_some() => Some(Action::Play(!settings.is_playing)),
+            // A control that has the focus is pressed by it.
+            Key::Space if settings.clip.is_some() && !is_on_control => {
+                Some(Action::Play(!settings.is_playing))
+            }
             Key::X => {
                 self.kept.settings.techniques.swap(0, 1);
                 if self.kept.settings.techniques[0] == crate::settings::TRUTH {

@@ -364,6 +364,10 @@ impl eframe::App for App<'_> {
         self.windows(ui.ctx());
         self.ask();
         self.after_ui(ui.ctx());
+        if self.gpu.lost().is_some() {
+            // egui panics if it is to upload shapes to a device that is lost.
+            ui.ctx().graphics_mut(|layers| *layers = Default::default());
+        }
     }
 
     fn raw_input_hook(&mut self, _: &egui::Context, input: &mut egui::RawInput) {

@@ -20,33 +20,36 @@ const DEPTHS: u32 = 128;
 impl App<'_> {
     /// Shows the windows that are open.
     pub(super) fn windows(&mut self, context: &egui::Context) {
-        for (i, (panel, title, _)) in Panel::ALL.into_iter().enumerate() {
+        for (i, (panel, name, _)) in Panel::ALL.into_iter().enumerate() {
             if panel == Panel::Controls || !self.is_shown(panel) {
                 continue;
             }
-            let mut is_open = true;
+            let mut is_closed = false;
             let most = context.content_rect().size() - vec2(24.0, 80.0);
             let width = f32::min(440.0, most.x.max(120.0));
             // The windows begin at the right of the picture, each a little below the one before.
             let corner = self.picture_rect.right_top() + vec2(-width - 24.0, 4.0 + 20.0 * i as f32);
-            Window::new(title)
+            Window::new(name)
                 .default_pos(corner.max(egui::pos2(4.0, self.picture_rect.top())))
-                .id(egui::Id::unique(title))
-                .open(&mut is_open)
+                .id(egui::Id::unique(name))
+                .title_bar(false)
                 .default_width(width)
                 .max_width(most.x.max(120.0))
                 .max_height(most.y.max(120.0))
                 .constrain(true)
-                .show(context, |ui| match panel {
-                    Panel::Controls => {}
-                    Panel::Times => self.times(ui),
-                    Panel::TryThese => self.try_these(ui),
-                    Panel::Theory => self.theory(ui),
-                    Panel::Map => self.map(ui),
-                    Panel::LightSpace => self.light_space(ui),
-                    Panel::Help => help(ui),
+                .show(context, |ui| {
+                    is_closed = title(ui, name);
+                    match panel {
+                        Panel::Controls => {}
+                        Panel::Times => self.times(ui),
+                        Panel::TryThese => self.try_these(ui),
+                        Panel::Theory => self.theory(ui),
+                        Panel::Map => self.map(ui),
+                        Panel::LightSpace => self.light_space(ui),
+                        Panel::Help => help(ui),
+                    }
                 });
-            if !is_open {
+            if is_closed {
                 self.show(panel, false);
             }
         }
@@ -338,6 +341,19 @@ fn errors_along(plan: &Plan, camera: &Camera) -> Vec<(f64, Option<[f64; 3]>)> {
         Some([error.s, error.t, error.worst])
     };
     (0..DEPTHS).map(|i| (depth(i), errors(depth(i)))).collect()
+}
+
+/// The title of a window, in place of egui's own, whose buttons have no tooltips. Gives whether the
+/// window shall close.
+fn title(ui: &mut Ui, name: &str) -> bool {
+    let is_closed = ui.horizontal(|ui| {
+        ui.label(RichText::new(name).strong());
+        let right_to_left = egui::Layout::right_to_left(egui::Align::Center);
+        let button = ui.with_layout(right_to_left, |ui| ui.small_button("×"));
+        button.inner.tip("Close this window (Escape).").clicked()
+    });
+    ui.separator();
+    is_closed.inner
 }
 
 fn help(ui: &mut Ui) {
