@@ -189,7 +189,8 @@ impl App<'_> {
             }
             Key::P if modifiers.command => return Some(Action::Save("umbrage-view.png".into())),
             Key::Escape => {
-                if self.kept.message.take().is_none()
+                // A message that is no longer shown keeps nothing open.
+                if self.kept.message.take().is_none_or(|message| message.is_over())
                     && let Some(panel) =
                         self.kept.shown.panels.iter().rev().find(|&&p| p != Panel::Controls)
                 {

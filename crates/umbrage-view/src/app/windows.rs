@@ -126,7 +126,7 @@ impl App<'_> {
             .allow_scroll(false)
             .show(ui, |plot| plotted.into_iter().for_each(|line| plot.line(line)))
             .response
-            .tip("The time of the last 240 frames, each stage upon the one before.");
+            .tip("The time of the last 240 frames, each stage upon the one before. Click a name to hide it.");
     }
 
     fn try_these(&mut self, ui: &mut Ui) {
@@ -218,18 +218,25 @@ impl App<'_> {
                     plot.line(Line::new(name, points).color(color));
                 }
                 if let Some(depth) = mouse {
-                    plot.vline(VLine::new("mouse", depth.log10()).stroke(Stroke::new(1.0, Color32::GRAY)));
-                    let nearest = curves.iter().min_by(|a, b| {
-                        (a.0 - depth).abs().total_cmp(&(b.0 - depth).abs())
-                    });
+                    plot.vline(
+                        VLine::new("mouse", depth.log10()).stroke(Stroke::new(1.0, Color32::GRAY)),
+                    );
+                    let nearest = curves
+                        .iter()
+                        .min_by(|a, b| (a.0 - depth).abs().total_cmp(&(b.0 - depth).abs()));
                     if let Some((z, Some(errors))) = nearest {
                         let points = errors.map(|e| [z.log10(), e.log10()]).to_vec();
-                        plot.points(Points::new("at the mouse", points).radius(4.0).color(Color32::GRAY));
+                        plot.points(
+                            Points::new("at the mouse", points).radius(4.0).color(Color32::GRAY),
+                        );
                     }
                 }
             })
             .response
-            .tip("The perspective error E(z) of the present maps; point at the picture to mark a depth.");
+            .tip(
+                "The perspective error E(z) of the present maps; point at the picture to mark a \
+                 depth. Click a name to hide its line.",
+            );
         let lambdas: Vec<String> = plan
             .maps
             .iter()
