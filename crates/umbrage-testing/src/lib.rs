@@ -1,17 +1,19 @@
-//! Ignores tests, and states the reason, where third-party scenes, a GPU or a browser that they
-//! need is missing. This is decided when tests are built, because `#[ignore]` acts at compile time.
+//! Ignores tests, and states the reason, where third-party scenes, a GPU, a browser or a screen
+//! for windows that they need is missing. This is decided when tests are built, because `#[ignore]`
+//! acts at compile time.
 
 use proc_macro::{Delimiter, Literal, TokenStream, TokenTree};
 
 /// The name of each need, and the reason why it is missing; the reason is empty if it is present.
-const NEEDS: [(&str, &str); 3] = [
+const NEEDS: [(&str, &str); 4] = [
     ("scenes", env!("MISSING_SCENES")),
     ("gpu", env!("MISSING_GPU")),
     ("browser", env!("MISSING_BROWSER")),
+    ("window", env!("MISSING_WINDOW")),
 ];
 
 /// Ignores a test where one of its needs is missing: `#[needs(scenes)]`, `#[needs(gpu)]`,
-/// `#[needs(browser)]`, or several names with commas. The attribute must stand above `#[test]`.
+/// `#[needs(browser)]`, `#[needs(window)]`, or several names with commas. The attribute must stand above `#[test]`.
 #[proc_macro_attribute]
 pub fn needs(names: TokenStream, test: TokenStream) -> TokenStream {
     if !is_test(&test) {
@@ -21,7 +23,7 @@ pub fn needs(names: TokenStream, test: TokenStream) -> TokenStream {
     let mut reasons = Vec::new();
     for name in names.split(',').map(str::trim) {
         match NEEDS.iter().find(|need| need.0 == name) {
-            None => return error(&format!("`{name}` must be scenes, gpu or browser")),
+            None => return error(&format!("`{name}` must be scenes, gpu, browser or window")),
             Some((_, "")) => {}
             Some((_, reason)) => reasons.push(*reason),
         }

@@ -9,7 +9,12 @@ use std::process::ExitCode;
 use std::time::SystemTime;
 
 fn main() -> std::io::Result<ExitCode> {
-    let built = [env!("MISSING_SCENES"), env!("MISSING_GPU"), env!("MISSING_BROWSER")];
+    let built = [
+        env!("MISSING_SCENES"),
+        env!("MISSING_GPU"),
+        env!("MISSING_BROWSER"),
+        env!("MISSING_WINDOW"),
+    ];
     let missing = needs::missing();
     if missing != built {
         let script = concat!(env!("CARGO_MANIFEST_DIR"), "/build.rs");

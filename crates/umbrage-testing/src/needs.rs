@@ -1,11 +1,13 @@
-//! Looks for what some tests need and a machine may lack: third-party scenes, a GPU and a browser.
+//! Looks for what some tests need and a machine may lack: third-party scenes, a GPU, a browser and a
+//! screen for windows.
 
 use std::path::{Path, PathBuf};
 
-/// For third-party scenes, a GPU and a browser, in this order: the reason why tests that need it
-/// are ignored. The reason is empty if the need is met.
-pub(crate) fn missing() -> [String; 3] {
-    [missing_scenes(), missing_gpu(), missing_browser()].map(Option::unwrap_or_default)
+/// For third-party scenes, a GPU, a browser and windows, in this order: the reason why tests that
+/// need it are ignored. The reason is empty if the need is met.
+pub(crate) fn missing() -> [String; 4] {
+    [missing_scenes(), missing_gpu(), missing_browser(), missing_window()]
+        .map(Option::unwrap_or_default)
 }
 
 /// The folder of third-party scenes, whether or not it exists.
@@ -46,12 +48,20 @@ fn missing_browser() -> Option<String> {
     let names = told
         .as_deref()
         .map_or(vec!["chromium", "chromium-browser", "google-chrome"], |name| vec![name]);
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let is_here = |name: &&str| folders.iter().any(|folder| folder.join(name).is_file());
-    (!names.iter().any(is_here)).then(|| {
+    (!names.iter().any(|name| is_program(name))).then(|| {
         format!("needs a browser: there is no {} (tools/setup installs Chromium)", names.join(", "))
     })
+}
+
+/// Each test opens its windows on a screen of its own, which nobody sees.
+fn missing_window() -> Option<String> {
+    (!is_program("Xvfb"))
+        .then(|| "needs a window: there is no Xvfb (tools/setup installs it)".to_owned())
+}
+
+fn is_program(name: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(name).is_file())
 }
 
 fn set(variable: &str) -> Option<String> {

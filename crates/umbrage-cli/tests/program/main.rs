@@ -15,6 +15,8 @@ mod plan;
 mod render;
 mod scene_options;
 mod scenes;
+mod screen;
 mod session;
 mod sweep;
 mod theory;
+mod window;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use umbrage_testing::needs;
 
 /// A node that draws a box: its name, its middle, and half its edges.
-type Block<'a> = (&'a str, [f64; 3], [f64; 3]);
+pub(crate) type Block<'a> = (&'a str, [f64; 3], [f64; 3]);
 
 const GROUND: Block<'_> = ("Ground", [0.0, -0.5, 0.0], [4000.0, 0.5, 4000.0]);
 const TOWER: Block<'_> = ("Tower", [0.0, 1.0, 0.0], [0.4, 1.0, 0.4]);
@@ -30,7 +30,7 @@ const VIEW: [&str; 10] = [
 ];
 
 /// Writes a scene of blocks. `more` are further nodes, and the parts of the file that they need.
-fn write(desk: &Desk, name: &str, blocks: &[Block<'_>], more: &Value) {
+pub(crate) fn write(desk: &Desk, name: &str, blocks: &[Block<'_>], more: &Value) {
     let mut corners: Vec<u8> = Vec::new();
     for i in 0..8 {
         for bit in 0..3 {

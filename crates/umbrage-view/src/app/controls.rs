@@ -138,6 +138,8 @@ impl App<'_> {
     fn bottom(&mut self, ui: &mut Ui) {
         let context = ui.ctx().clone();
         let mut is_closed = false;
+        // A message must not change the picture's size, which would be drawn and traced anew.
+        ui.set_min_height(ui.spacing().interact_size.y);
         ui.horizontal(|ui| {
             if let Some((what, share)) = &self.job {
                 ui.add(ProgressBar::new(*share).desired_width(120.0));
@@ -150,11 +152,9 @@ impl App<'_> {
                     false => ui.visuals().strong_text_color(),
                 };
                 is_closed = ui.small_button("×").tip("Take this message away (Escape).").clicked();
-                // One line, so that a long message does not change the size of the picture.
-                let line = RichText::new(&message.text).color(color);
-                ui.add(egui::Label::new(line).truncate());
-                ui.separator();
+                ui.add(egui::Label::new(RichText::new(&message.text).color(color)).truncate());
                 context.request_repaint_after_secs(1.0);
+                return;
             }
             let hint = context.data_mut(|data| data.remove_temp::<&'static str>(hint_id()));
             ui.label(RichText::new(hint.unwrap_or(self.gpu.info().name.as_str())).weak());

@@ -20,32 +20,34 @@ const DEPTHS: u32 = 128;
 impl App<'_> {
     /// Shows the windows that are open.
     pub(super) fn windows(&mut self, context: &egui::Context) {
-        for (panel, title, _) in Panel::ALL {
+        for (panel, name, _) in Panel::ALL {
             if panel == Panel::Controls || !self.is_shown(panel) {
                 continue;
             }
-            let mut is_open = true;
+            let mut is_closed = false;
             let most = context.content_rect().size() - vec2(24.0, 80.0);
             let width = f32::min(440.0, most.x.max(120.0));
-            let at = first_place(panel, self.picture_rect, width);
-            Window::new(title)
-                .default_pos(at)
-                .id(egui::Id::unique(title))
-                .open(&mut is_open)
+            Window::new(name)
+                .default_pos(first_place(panel, self.picture_rect, width))
+                .id(egui::Id::unique(name))
+                .title_bar(false)
                 .default_width(width)
                 .max_width(most.x.max(120.0))
                 .max_height(most.y.max(120.0))
                 .constrain(true)
-                .show(context, |ui| match panel {
-                    Panel::Controls => {}
-                    Panel::Times => self.times(ui),
-                    Panel::TryThese => self.try_these(ui),
-                    Panel::Theory => self.theory(ui),
-                    Panel::Map => self.map(ui),
-                    Panel::LightSpace => self.light_space(ui),
-                    Panel::Help => help(ui),
+                .show(context, |ui| {
+                    is_closed = title(ui, name);
+                    match panel {
+                        Panel::Controls => {}
+                        Panel::Times => self.times(ui),
+                        Panel::TryThese => self.try_these(ui),
+                        Panel::Theory => self.theory(ui),
+                        Panel::Map => self.map(ui),
+                        Panel::LightSpace => self.light_space(ui),
+                        Panel::Help => help(ui),
+                    }
                 });
-            if !is_open {
+            if is_closed {
                 self.show(panel, false);
             }
         }
@@ -122,7 +124,7 @@ impl App<'_> {
             .allow_scroll(false)
             .show(ui, |plot| plotted.into_iter().for_each(|line| plot.line(line)))
             .response
-            .tip("The time of the last 240 frames, each stage upon the one before.");
+            .tip("The time of the last 240 frames, each stage upon the one before. Click a name to hide it.");
     }
 
     fn try_these(&mut self, ui: &mut Ui) {
@@ -221,18 +223,25 @@ impl App<'_> {
                     plot.line(Line::new(name, points).color(color));
                 }
                 if let Some(depth) = mouse {
-                    plot.vline(VLine::new("mouse", depth.log10()).stroke(Stroke::new(1.0, Color32::GRAY)));
-                    let nearest = curves.iter().min_by(|a, b| {
-                        (a.0 - depth).abs().total_cmp(&(b.0 - depth).abs())
-                    });
+                    plot.vline(
+                        VLine::new("mouse", depth.log10()).stroke(Stroke::new(1.0, Color32::GRAY)),
+                    );
+                    let nearest = curves
+                        .iter()
+                        .min_by(|a, b| (a.0 - depth).abs().total_cmp(&(b.0 - depth).abs()));
                     if let Some((z, Some(errors))) = nearest {
                         let points = errors.map(|e| [z.log10(), e.log10()]).to_vec();
-                        plot.points(Points::new("at the mouse", points).radius(4.0).color(Color32::GRAY));
+                        plot.points(
+                            Points::new("at the mouse", points).radius(4.0).color(Color32::GRAY),
+                        );
                     }
                 }
             })
             .response
-            .tip("The perspective error E(z) of the present maps; point at the picture to mark a depth.");
+            .tip(
+                "The perspective error E(z) of the present maps; point at the picture to mark a \
+                 depth. Click a name to hide its line.",
+            );
         let lambdas: Vec<String> = plan
             .maps
             .iter()
@@ -356,6 +365,19 @@ fn errors_along(plan: &Plan, camera: &Camera) -> Vec<(f64, Option<[f64; 3]>)> {
         Some([error.s, error.t, error.worst])
     };
     (0..DEPTHS).map(|i| (depth(i), errors(depth(i)))).collect()
+}
+
+/// The title of a window, in place of egui's own, whose buttons have no tooltips. Gives whether the
+/// window shall close.
+fn title(ui: &mut Ui, name: &str) -> bool {
+    let is_closed = ui.horizontal(|ui| {
+        ui.label(RichText::new(name).strong());
+        let right_to_left = egui::Layout::right_to_left(egui::Align::Center);
+        let button = ui.with_layout(right_to_left, |ui| ui.small_button("×"));
+        button.inner.tip("Close this window (Escape).").clicked()
+    });
+    ui.separator();
+    is_closed.inner
 }
 
 fn help(ui: &mut Ui) {
