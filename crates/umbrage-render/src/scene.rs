@@ -1,6 +1,6 @@
 use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use umbrage::{Aabb, Camera};
@@ -51,6 +51,8 @@ pub(crate) struct Drawable {
     pub(crate) instance: usize,
     /// Index of the mesh.
     pub(crate) mesh: usize,
+    /// Transform of the positions as they are uploaded, which are relative to the mesh's
+    /// [anchor].
     pub(crate) world_from_mesh: DAffine3,
     /// World space, metres.
     pub(crate) bounds: Aabb,
@@ -149,8 +151,10 @@ impl SceneBuffers {
                 });
             }
         }
+        let placed = Placed::new(scene);
+        let meshes_with_boxes = scene.meshes.iter().zip(&placed.mesh_boxes);
         let all_positions: Vec<Vec3> =
-            scene.meshes.iter().flat_map(|m| m.positions.iter().copied()).collect();
+            meshes_with_boxes.flat_map(|(mesh, &bounds)| uploaded(mesh, bounds)).collect();
         let mut attributes = Vec::with_capacity(vertices * floats);
         for mesh in &scene.meshes {
             push_attributes(mesh, has_alpha, &mut attributes);
@@ -189,7 +193,7 @@ impl SceneBuffers {
             meshes,
             materials: materials.list,
             material_layout,
-            placed: RwLock::new(Placed::new(scene)),
+            placed: RwLock::new(placed),
         };
         gpu.check()?;
         Ok(buffers)
@@ -219,13 +223,14 @@ impl SceneBuffers {
         let mut attributes = Vec::new();
         for (i, mesh, range) in deformed {
             let first = range.first_vertex as u64;
-            let positions = bytemuck::cast_slice(&mesh.positions);
-            gpu.queue().write_buffer(&self.positions, first * size_of::<Vec3>() as u64, positions);
+            placed.mesh_boxes[i] = mesh.bounds();
+            let positions: Vec<Vec3> = uploaded(mesh, placed.mesh_boxes[i]).collect();
+            let contents = bytemuck::cast_slice(&positions);
+            gpu.queue().write_buffer(&self.positions, first * size_of::<Vec3>() as u64, contents);
             attributes.clear();
             push_attributes(mesh, stride == WITH_ALPHA.array_stride, &mut attributes);
             let contents = bytemuck::cast_slice(&attributes);
             gpu.queue().write_buffer(&self.attributes, first * stride, contents);
-            placed.mesh_boxes[i] = mesh.bounds();
         }
         let casters = placed.move_instances(scene, &moved.instances);
         gpu.check()?;
@@ -306,8 +311,31 @@ impl Drawable {
         let corners = mesh_boxes[mesh].corners().map(|p| world_from_mesh.transform_point3(p));
         let bounds = if mesh_boxes[mesh].is_empty() { Aabb::EMPTY } else { Aabb::around(corners) };
         let role = scene.roles.of(instance);
+        let world_from_mesh =
+            world_from_mesh * DAffine3::from_translation(anchor(mesh_boxes[mesh]));
         Self { instance, mesh, world_from_mesh, bounds, role }
     }
+}
+
+/// The point of a mesh's space that its uploaded positions are relative to, metres. It is the
+/// space's origin, but for meshes that lie far from it: those of a city in map coordinates, say.
+/// Single precision holds their positions, but not where the viewer is among these, and the sum of
+/// the two would be off by a good part of a metre.
+fn anchor(bounds: Aabb) -> DVec3 {
+    /// Largest distance from the origin, in sizes of the mesh, at which rounding does not matter.
+    const FAR: f64 = 100.0;
+    let distance = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let size = (bounds.max - bounds.min).max_element();
+    match bounds.is_empty() || distance <= FAR * size {
+        true => DVec3::ZERO,
+        false => bounds.center(),
+    }
+}
+
+/// A mesh's positions as they are uploaded. `bounds` is the box around the mesh.
+fn uploaded(mesh: &Mesh, bounds: Aabb) -> impl Iterator<Item = Vec3> {
+    let anchor = anchor(bounds);
+    mesh.positions.iter().map(move |p| (p.as_dvec3() - anchor).as_vec3())
 }
 
 /// Adds the attributes of a mesh's vertices, as [`PLAIN`] or [`WITH_ALPHA`] lays them out.

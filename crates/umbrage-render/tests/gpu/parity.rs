@@ -649,6 +649,32 @@ fn a_million_metres_from_the_origin() {
     }
 }
 
+/// A mesh whose own positions are far from its origin, as in map coordinates, is drawn where it is,
+/// also for a viewer between the numbers that single precision has there.
+#[needs(gpu)]
+#[test]
+fn a_mesh_far_from_its_own_origin() {
+    let near = scene("pole");
+    let mut scene = near.clone();
+    let offset = Vec3::new(1_048_576.0, 0.0, -524_288.0);
+    for position in scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions) {
+        *position = (*position * 8.0).round() / 8.0 + offset;
+    }
+    let mut set = Set::new(&scene, IMAGE);
+    let mut look = near.default_view();
+    look.eye += offset.as_dvec3() + DVec3::new(0.031, 0.0, -0.027);
+    look.target += offset.as_dvec3();
+    set.camera = look.camera(IMAGE).unwrap();
+    let light = near.default_light().light;
+    let technique = technique(TECHNIQUES[4], Filter::Hard);
+    let plan = set.plan(&[light], &technique);
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    let samples = draw(&set, &plan, &shading, &ShadowOptions::default(), GPU.support());
+    let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+    let difference = compare(&set, &plan, (0, &light), &samples, &reference);
+    check("pole", &technique, &difference);
+}
+
 /// Maps stay where they are when the camera moves away from that of their plan, and surfaces that
 /// they do not hold are lit.
 #[needs(gpu)]
