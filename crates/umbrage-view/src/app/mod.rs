@@ -336,8 +336,9 @@ impl<'k> App<'k> {
         let Some(problem) = self.gpu.lost() else { return false };
         if self.kept.outcome != Outcome::DeviceLost {
             self.kept.outcome = Outcome::DeviceLost;
-            let words = problem.split_whitespace().collect::<Vec<_>>().join(" ");
-            self.complain(format!("the GPU was lost ({words}) and has been opened again"));
+            let why = problem.split_whitespace().collect::<Vec<_>>().join(" ");
+            let why = if why.is_empty() { why } else { format!(" ({why})") };
+            self.complain(format!("the GPU was lost{why} and has been opened again"));
             let settings = self.kept.settings.clone();
             let again = ToOpen::scene(&settings.scene, &settings);
             let kind = if self.info.is_some() { Kind::Again } else { Kind::Scene };
