@@ -74,7 +74,7 @@ impl App<'_> {
                         listed(&names)
                     ));
                 };
-                settings.look_from(Some(name.clone()), view);
+                settings.look_from(Some(name.clone()), view, &info);
             }
             Action::Eye(eye) => {
                 settings.moved();

@@ -139,16 +139,7 @@ impl App<'_> {
         let info = self.info.as_ref()?;
         // The boxes around the surfaces tell the depth well enough for a mark in a plot.
         let ray = camera.ray(pixel);
-        let (start, direction) = (camera.eye() + ray.start, ray.direction);
-        let hit = |aabb: &umbrage::Aabb| {
-            let a = (aabb.min - start) / direction;
-            let b = (aabb.max - start) / direction;
-            let enter = a.min(b).max_element();
-            let leave = a.max(b).min_element();
-            (enter <= leave && leave > camera.near()).then_some(enter.max(camera.near()))
-        };
-        let nearest = info.boxes.iter().filter_map(hit).fold(f64::INFINITY, f64::min);
-        nearest.is_finite().then_some(nearest)
+        info.first_box(camera.eye() + ray.start, ray.direction)
     }
 
     /// What keys do that no control wants.

@@ -170,4 +170,16 @@ impl SceneInfo {
             lights.into_iter().zip(scene.lights.iter().map(|l| l.light)).collect(),
         )
     }
+
+    /// Where a ray enters the nearest box around surfaces, in lengths of the direction; `None` if
+    /// there is none before it.
+    pub(crate) fn first_box(&self, start: DVec3, direction: DVec3) -> Option<f64> {
+        let enters = |aabb: &Aabb| {
+            let a = (aabb.min - start) / direction;
+            let b = (aabb.max - start) / direction;
+            let [enter, leave] = [a.min(b).max_element(), a.max(b).min_element()];
+            (enter <= leave && enter > 0.0).then_some(enter)
+        };
+        self.boxes.iter().filter_map(enters).min_by(f64::total_cmp)
+    }
 }
