@@ -190,7 +190,7 @@ mod tests {
             None => choose_view(&opened.view, &Defaults::of(None)).unwrap().view,
         };
         let (mut settings, name) = (opened.settings, opened.view.camera.clone());
-        settings.look_from(name, &view);
+        settings.look_from(name, &view, &info());
         settings.near = opened.view.near.or(settings.near);
         settings.far = opened.view.far.or(settings.far);
         (settings, opened.light)

@@ -150,7 +150,7 @@ impl Settings {
 
     /// Takes the view and the light that a scene begins with.
     pub(crate) fn begin_with(&mut self, info: &SceneInfo) {
-        self.look_from(info.view_name.clone(), &info.view);
+        self.look_from(info.view_name.clone(), &info.view, info);
         self.shine(info);
         self.frozen = None;
         self.clip = None;
@@ -170,8 +170,21 @@ impl Settings {
     }
 
     /// Takes a view, which is that of the scene's camera of this name, if there is a name.
-    pub(crate) fn look_from(&mut self, name: Option<String>, view: &umbrage_scene::SceneCamera) {
+    pub(crate) fn look_from(
+        &mut self,
+        name: Option<String>,
+        view: &umbrage_scene::SceneCamera,
+        info: &SceneInfo,
+    ) {
         self.pose = Pose::new(view.eye, view.target, view.up);
+        if self.pose.distance() > 0.999 * view.far {
+            // Cameras of files have no target, and get one at the far distance. The view shall turn
+            // around what it shows, and go as fast as its distance suggests.
+            let shown = info.first_box(view.eye, self.pose.forward());
+            if let Some(distance) = shown.filter(|d| (view.near..view.far).contains(d)) {
+                self.pose.target = view.eye + self.pose.forward() * distance;
+            }
+        }
         self.lens = view.lens;
         self.camera = name;
         let is_of_file = self.camera.is_some();

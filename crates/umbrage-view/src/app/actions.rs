@@ -75,7 +75,7 @@ impl App<'_> {
                         listed(&names)
                     ));
                 };
-                settings.look_from(Some(name.clone()), view);
+                settings.look_from(Some(name.clone()), view, &info);
             }
             Action::Stand([eye, target]) => {
                 for position in [eye, target] {

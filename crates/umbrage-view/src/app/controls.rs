@@ -5,10 +5,9 @@ use crate::action::{Action, Copied, Panel, Theme};
 use crate::settings::{Compare, LightSetting, OverlayKind, TRUTH};
 use crate::sun::Sun;
 use egui::{
-    CollapsingHeader, ComboBox, DragValue, Id, ProgressBar, Response, RichText, ScrollArea, Slider,
-    TextEdit, Ui,
+    CollapsingHeader, ComboBox, DragValue, Id, LayerId, ProgressBar, Rect, Response, RichText,
+    ScrollArea, Slider, TextEdit, Ui,
 };
-use std::collections::HashSet;
 use std::path::PathBuf;
 use umbrage::visibility::LightSize;
 use umbrage_lab::Fit;
@@ -42,9 +41,10 @@ impl Tip for Response {
     }
 }
 
-/// The controls that have tooltips.
+/// The areas that have tooltips in this frame, with their layers. That of a slider holds its number,
+/// and that of a plot its legend, which can be clicked.
 #[derive(Clone, Default)]
-pub(super) struct Tipped(pub(super) HashSet<Id>);
+pub(super) struct Tipped(pub(super) Vec<(LayerId, Rect)>);
 
 pub(super) fn tipped_id() -> Id {
     Id::unique("controls with tooltips")
@@ -56,7 +56,9 @@ fn hint_id() -> Id {
 
 fn note_tip(response: &Response) {
     response.ctx.data_mut(|data| {
-        data.get_temp_mut_or_default::<Tipped>(tipped_id()).0.insert(response.id);
+        data.get_temp_mut_or_default::<Tipped>(tipped_id())
+            .0
+            .push((response.layer_id, response.rect));
     });
 }
 
@@ -64,7 +66,7 @@ impl App<'_> {
     /// The bars at the top and at the bottom.
     pub(super) fn bars(&mut self, ui: &mut Ui) {
         // A control that loses its tooltip must not be taken for one that has it.
-        ui.ctx().data_mut(|data| data.insert_temp(tipped_id(), Tipped::default()));
+        ui.data_mut(|data| data.remove_temp::<Tipped>(tipped_id()));
         egui::Panel::top("bar").show(ui, |ui| {
             ui.add_space(2.0);
             ui.horizontal_wrapped(|ui| self.top(ui));

@@ -366,16 +366,19 @@ fn check_tooltips(context: &Context) -> Done {
     let tipped = context.data(|data| data.get_temp::<Tipped>(tipped_id())).unwrap_or_default();
     let lacking: Vec<String> = context.viewport(|viewport| {
         let widgets = &viewport.prev_pass.widgets;
+        // The edge of a panel shows by the mouse's cursor what it does.
+        let is_edge = |w: &egui::WidgetRect| w.rect.size().min_elem() < 8.0;
         let is_control = |w: &&egui::WidgetRect| {
-            w.enabled && w.visible && w.sense.senses_click() && w.sense.is_focusable()
+            let can_press = w.sense.senses_click() && w.sense.is_focusable();
+            w.enabled && w.visible && can_press && !is_edge(w)
         };
         let mut lacking = Vec::new();
-        for (_, layer) in widgets.layers() {
-            let is_tipped = |w: &&egui::WidgetRect| tipped.0.contains(&w.id);
-            // The tooltip of a plot also explains its legend, whose entries can be clicked.
-            let areas: Vec<egui::Rect> = layer.iter().filter(is_tipped).map(|w| w.rect).collect();
-            let all = layer.iter().filter(is_control);
-            let without = all.filter(|w| !areas.iter().any(|area| area.contains_rect(w.rect)));
+        for (layer, of_layer) in widgets.layers() {
+            let areas = tipped.0.iter().filter(|(of, _)| of == layer);
+            let areas: Vec<egui::Rect> = areas.map(|(_, area)| area.expand(0.5)).collect();
+            let has_none =
+                |w: &&egui::WidgetRect| !areas.iter().any(|area| area.contains_rect(w.rect));
+            let without = of_layer.iter().filter(is_control).filter(has_none);
             lacking.extend(without.map(|w| format!("{:?} at {:?}", widgets.info(w.id), w.rect)));
         }
         lacking

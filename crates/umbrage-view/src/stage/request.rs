@@ -162,4 +162,16 @@ impl SceneInfo {
         let word = |i| choices.words(i).into_iter().next().unwrap_or_else(|| format!("#{}", i + 1));
         (0..choices.len()).map(word).collect()
     }
+
+    /// Where a ray enters the nearest box around surfaces, in lengths of the direction; `None` if
+    /// there is none before it.
+    pub(crate) fn first_box(&self, start: DVec3, direction: DVec3) -> Option<f64> {
+        let enters = |aabb: &Aabb| {
+            let a = (aabb.min - start) / direction;
+            let b = (aabb.max - start) / direction;
+            let [enter, leave] = [a.min(b).max_element(), a.max(b).min_element()];
+            (enter <= leave && enter > 0.0).then_some(enter)
+        };
+        self.boxes.iter().filter_map(enters).min_by(f64::total_cmp)
+    }
 }
