@@ -3,6 +3,7 @@
 
 use crate::desk::Desk;
 use image::RgbImage;
+use serde_json::json;
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -60,6 +61,21 @@ pub(crate) struct Windows {
     _alone: MutexGuard<'static, ()>,
 }
 
+/// A line of a script as the program reads it.
+fn json_line(line: &str) -> String {
+    let (verb, rest) = line.split_once(' ').unwrap_or((line, ""));
+    match verb {
+        _ if line.is_empty() || line.starts_with('{') => line.to_owned(),
+        "open" => json!({"load": rest}).to_string(),
+        "fail-to-open" => json!({"load-fails": rest}).to_string(),
+        "size" => {
+            let sides: Vec<u32> = rest.split(' ').map(|side| side.parse().unwrap()).collect();
+            json!({"size": sides}).to_string()
+        }
+        _ => json!({"do": line}).to_string(),
+    }
+}
+
 /// What a script left behind.
 pub(crate) struct Scripted {
     pub(crate) code: i32,
@@ -84,11 +100,14 @@ impl Windows {
         Self { desk: Desk::new(), screen: Screen::new(size), folder, _alone: alone }
     }
 
-    /// Opens a scene, goes through a script, and gives what came of it.
+    /// Opens a scene, goes through a script, and gives what came of it. Lines of the script that
+    /// are no JSON are words as `do` takes them, or `open NAME`, `fail-to-open NAME` and
+    /// `size WIDTH HEIGHT`.
     pub(crate) fn try_script(&mut self, scene: &str, script: &str) -> Scripted {
         assert!(self.screen.server.0.try_wait().unwrap().is_none(), "Xvfb runs");
-        let path = self.folder.join("script.txt");
-        std::fs::write(&path, script).unwrap();
+        let path = self.folder.join("script.jsonl");
+        let lines: String = script.lines().map(|line| json_line(line) + "\n").collect();
+        std::fs::write(&path, lines).unwrap();
         let [script, pictures] = [&path, &self.folder].map(|p| p.to_str().unwrap());
         let messages = self.folder.join("messages.txt");
         let mut command = self.desk.command(&["-v", "view", scene, "--script", script]);

@@ -130,7 +130,7 @@ fn shoot(actions: &str, wait: &str, name: &str) -> String {
 #[test]
 fn overlays_have_legends() {
     let mut script = format!("{SMALL}technique uniform+z2:hard@64\n");
-    let overlays = ["none", "error", "grid", "maps", "difference"];
+    let overlays = ["none", "error", "texels", "partition", "difference"];
     for overlay in overlays {
         let wait = if overlay == "difference" { "truth" } else { "ready" };
         script += &shoot(&format!("overlay {overlay}"), wait, overlay);
@@ -231,7 +231,7 @@ fn lights_and_views_are_chosen() {
         "walk 1 0 1",
         "fly on; approach 0.7",
         "eye 4 6 8; target 0 0 0",
-        "overlay grid; fit box",
+        "overlay texels; fit box",
         "fit seen",
         "overlay none; technique lispsm@512; freeze on; orbit 40 20; approach 2",
         "freeze off",
@@ -266,12 +266,12 @@ fn scenes_and_sessions_are_opened() {
     for name in ["sphere", "fence", "slit"] {
         script += &shoot(&format!("open {name}"), "ready", name);
     }
-    script +=
-        "technique lispsm+z2:pcf3@256\nsecond psm@64\ncompare wipe\noverlay maps\norbit 20 5\n";
+    script += "technique lispsm+z2:pcf3@256\nsecond psm@64\ncompare wipe\noverlay partition\norbit 20 5\n";
     script += &shoot("sun 100 40; fit seen", "ready", "saved");
     script += "save-session kept.json\nexpect saved kept.json\n";
     for (i, wrong) in ["broken.glb", "nowhere.glb", "broken.json", "twon"].iter().enumerate() {
-        script += &shoot(&format!("open {wrong}\nexpect {wrong}"), "ready", &format!("wrong{i}"));
+        script +=
+            &shoot(&format!("fail-to-open {wrong}\nexpect {wrong}"), "ready", &format!("wrong{i}"));
     }
     script += &shoot("open stage.gltf; compare alone", "ready", "stage");
     script += &shoot("clip 1; seek 0.5", "ready", "posed");
@@ -335,8 +335,8 @@ fn animations_play() {
 #[test]
 fn memory_stays_flat() {
     let script = "size 300 300\npanel controls off\nresolution 0.2\ncount-errors off\n\
-                  technique lispsm+z2:pcf3@128\nwait 200 frames\nnote-memory\n\
-                  wait 2000 frames\ncheck-memory 5%\nshoot window\n";
+                  technique lispsm+z2:pcf3@128\nwait 200 turns\nnote-memory\n\
+                  wait 2000 turns\ncheck-memory 5%\nshoot window\n";
     let run = Windows::new("memory_stays_flat").script("pole", script);
     let noted: Vec<&str> = run.stderr.lines().filter(|l| l.contains("Memory {")).collect();
     assert_eq!(noted.len(), 2, "{}", run.stderr);
@@ -354,7 +354,7 @@ fn memory_stays_flat() {
 #[test]
 fn a_lost_device_is_opened_again() {
     let mut script = SMALL.to_owned();
-    script += "technique lispsm+z2:pcf3@256\nsun 200 40\norbit 20 5\noverlay maps\n";
+    script += "technique lispsm+z2:pcf3@256\nsun 200 40\norbit 20 5\noverlay partition\n";
     script += &shoot("panel theory on; panel theory off", "ready", "before");
     script += "lose-device\nexpect the GPU was lost\n";
     script += &shoot("size 640 480", "ready", "after");
