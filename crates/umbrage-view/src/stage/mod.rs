@@ -20,6 +20,8 @@ use mailbox::Mailbox;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 use umbrage_render::Gpu;
 
 /// What the threads tell the window.
@@ -79,7 +81,7 @@ struct SceneThreads {
 
 impl Drop for SceneThreads {
     fn drop(&mut self) {
-        // Its threads end by themselves; the window does not wait for them.
+        // Its threads end by themselves; a window that goes on does not wait for them.
         self.requests.close();
     }
 }
@@ -94,13 +96,44 @@ pub(crate) struct Stage {
     coming: Option<SceneThreads>,
     frames: Arc<AtomicU64>,
     scenes: u64,
+    /// Threads of all scenes that may still run.
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Drop for Stage {
+    /// Waits for the threads, for a while. A thread that dropped the device last would unload the
+    /// driver while the program ends and the driver tidies up in its main thread, which crashes.
+    fn drop(&mut self) {
+        const LONGEST: Duration = Duration::from_secs(3);
+        self.shown = None;
+        self.coming = None;
+        let began = Instant::now();
+        while self.threads.iter().any(|thread| !thread.is_finished()) {
+            if began.elapsed() > LONGEST {
+                // The driver stays loaded to the end.
+                std::mem::forget(self.gpu.clone());
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
 }
 
 impl Stage {
     pub(crate) fn new(gpu: Gpu, context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         let frames = Arc::new(AtomicU64::new(0));
-        Self { gpu, context, sender, receiver, shown: None, coming: None, frames, scenes: 0 }
+        Self {
+            gpu,
+            context,
+            sender,
+            receiver,
+            shown: None,
+            coming: None,
+            frames,
+            scenes: 0,
+            threads: Vec::new(),
+        }
     }
 
     /// Begins to open a scene. The one that is shown stays until the new one is open.
@@ -117,11 +150,14 @@ impl Stage {
         self.coming = Some(threads);
         let (gpu, frames) = (self.gpu.clone(), Arc::clone(&self.frames));
         let run = move || scene::run(&scene, gpu, &reporter, &requests, jobs_to_do, &frames);
-        let started = std::thread::Builder::new().name("scene".into()).spawn(run);
-        if let Err(e) = started {
-            self.coming = None;
-            let news = News::Failed(format!("no thread for the scene: {e}"));
-            let _ = self.sender.send(FromScene { scene: self.scenes, news });
+        self.threads.retain(|thread| !thread.is_finished());
+        match std::thread::Builder::new().name("scene".into()).spawn(run) {
+            Ok(thread) => self.threads.push(thread),
+            Err(e) => {
+                self.coming = None;
+                let news = News::Failed(format!("no thread for the scene: {e}"));
+                let _ = self.sender.send(FromScene { scene: self.scenes, news });
+            }
         }
     }
 
