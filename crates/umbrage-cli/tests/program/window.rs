@@ -230,7 +230,7 @@ fn lights_and_views_are_chosen() {
         "look 4 0",
         "walk 1 0 1",
         "fly on; approach 0.7",
-        "eye 4 6 8; target 0 0 0",
+        "stand 4 6 8 0 0 0",
         "overlay texels; fit box",
         "fit seen",
         "overlay none; technique lispsm@512; freeze on; orbit 40 20; approach 2",
