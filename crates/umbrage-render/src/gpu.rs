@@ -192,7 +192,12 @@ impl Gpu {
         });
         let told = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |error| {
-            lock(&told).refused.get_or_insert(error.to_string());
+            let error = error.to_string();
+            // The surface of a window cannot be resized while another thread submits work. This is
+            // no error of that work, and whoever owns the window tries again with its next frame.
+            if !error.contains("Surface::configure") {
+                lock(&told).refused.get_or_insert(error);
+            }
         }));
         Ok(Self {
             device,

@@ -223,11 +223,6 @@ impl<'k> App<'k> {
     }
 
     fn refused(&mut self, problem: String) {
-        // The window's surface cannot be resized while a thread of the stage submits work. egui
-        // tries again with the next frame.
-        if problem.contains("Surface::configure") {
-            return log::debug!("{problem}");
-        }
         if self.kept.driver.is_some() {
             self.kept.outcome = Outcome::Failed(problem.clone());
         }
