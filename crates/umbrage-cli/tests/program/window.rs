@@ -84,7 +84,8 @@ fn write_stage(windows: &Windows) {
     let corners = json!({"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3",
                          "min": [-1, -1, -1], "max": [1, 1, 1]});
     let indices = json!({"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"});
-    let down = [-0.70710678, 0.0, 0.0, 0.70710678];
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let down = [-half, 0.0, 0.0, half];
     let light = |i: u32| json!({"KHR_lights_punctual": {"light": i}});
     let more = json!({
         "accessors": [corners, indices, floats(2, "SCALAR", 0), floats(2, "VEC3", 8)],
@@ -385,7 +386,7 @@ fn windows_have_any_size_and_look() {
     for shot in [&phone, &light, &scaled, &before, &after, &large] {
         shot.is_fine();
     }
-    assert_eq!([&phone, &before, &large].map(|s| s.size()), [[390, 844], [640, 480], [3840, 2160]]);
+    assert_eq!([&phone, &before, &large].map(Shot::size), [[390, 844], [640, 480], [3840, 2160]]);
     light.is_unlike(&phone, 20.0);
     scaled.is_unlike(&phone, 2.0);
     after.is_like(&before, 0.01);
