@@ -112,6 +112,7 @@ fn start_log(verbose: u8) {
     env_logger::Builder::new()
         .filter_level(level)
         .filter_module("wgpu_hal", drivers)
+        .filter_module("egui_wgpu", drivers)
         .format(|out, record| {
             use std::io::Write;
             writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())

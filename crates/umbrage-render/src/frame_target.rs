@@ -83,8 +83,8 @@ impl FrameTarget {
         &self.color
     }
 
-    /// The picture for shaders that read sRGB values as they are stored, as those of windows do. Its
-    /// format is `Rgba8Unorm`.
+    /// The picture for shaders that read sRGB values as they are stored, as those of windows do.
+    /// Its format is `Rgba8Unorm`.
     pub fn shown_view(&self) -> &TextureView {
         &self.shown_view
     }
@@ -97,8 +97,8 @@ impl FrameTarget {
         }
     }
 
-    /// Waits for the picture and returns its sRGB values, with alpha, row by row from the upper left
-    /// corner.
+    /// Waits for the picture and returns its sRGB values, with alpha, row by row from the upper
+    /// left corner.
     ///
     /// # Errors
     /// The device refused something or was lost.

@@ -5,7 +5,8 @@
 //! - [`SceneBuffers`] hold the meshes and materials of a scene on the device.
 //! - [`Renderer`] draws the maps of a plan, and then [frames](Renderer::frame) to display, with
 //!   or without [overlays](Overlay), or [samples](Renderer::samples) to measure.
-//! - [`FrameTarget`] is what frames, and [pictures of the maps](Renderer::show_map), are drawn into.
+//! - [`FrameTarget`] is what frames, and [pictures of the maps](Renderer::show_map), are drawn
+//!   into.
 //! - [`Timer`] measures what the stages of frames take.
 
 mod error;

@@ -151,9 +151,9 @@ impl Renderer<'_> {
     /// Draws a shadow map as a grey picture into a target of any size, without waiting for the
     /// device. `map` is its index in the plan whose maps were drawn last. The picture spans the map
     /// from (s, t) = (0, 0) in the upper left corner to (1, 1) in the lower right one. The nearest
-    /// caster to the light is almost white, the farthest dark grey, with greys in proportion to depth
-    /// between them; where nothing casts, the picture is dark blue. With a prefilter the picture
-    /// still shows the depths that the statistics are made from.
+    /// caster to the light is almost white, the farthest dark grey, with greys in proportion to
+    /// depth between them; where nothing casts, the picture is dark blue. With a prefilter the
+    /// picture still shows the depths that the statistics are made from.
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no such map, or if it is empty. The device refused something.

@@ -5,8 +5,8 @@ use std::time::Duration;
 use wgpu::{CommandEncoder, Features, PollType};
 use wgpu_profiler::{GpuProfiler, GpuProfilerQuery, GpuProfilerSettings};
 
-/// Measures the time that the stages of frames take on the GPU. A frame is all that is timed between
-/// two calls of [`read`](Self::read) or [`try_read`](Self::try_read).
+/// Measures the time that the stages of frames take on the GPU. A frame is all that is timed
+/// between two calls of [`read`](Self::read) or [`try_read`](Self::try_read).
 pub struct Timer {
     profiler: GpuProfiler,
     /// Whether anything was timed in this frame.

@@ -1,5 +1,5 @@
-//! Looks for what some tests need and a machine may lack: third-party scenes, a GPU, a browser and a
-//! screen for windows.
+//! Looks for what some tests need and a machine may lack: third-party scenes, a GPU, a browser and
+//! a screen for windows.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,5 @@
-//! A screen that nobody sees, on which the program opens its window, and what pictures of the window
-//! show.
+//! A screen that nobody sees, on which the program opens its window, and what pictures of the
+//! window show.
 
 use crate::desk::Desk;
 use image::RgbImage;

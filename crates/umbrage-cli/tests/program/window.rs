@@ -70,7 +70,8 @@ fn techniques() -> Vec<String> {
     all.concat()
 }
 
-/// Writes `stage.gltf`: a box that slides over a floor within a second, two cameras and three lights.
+/// Writes `stage.gltf`: a box that slides over a floor within a second, two cameras and three
+/// lights.
 fn write_stage(windows: &Windows) {
     let blocks: [Block<'_>; 2] =
         [("Floor", [0.0, -0.5, 0.0], [5.0, 0.5, 5.0]), ("Box", [-2.0, 1.0, 0.0], [0.5, 1.0, 0.5])];
@@ -442,7 +443,8 @@ fn keys_reach_everything() {
     }
 }
 
-/// Tab goes through all controls, which Space and Enter press, and to the picture, which arrows turn.
+/// Tab goes through all controls, which Space and Enter press, and to the picture, which arrows
+/// turn.
 #[needs(gpu, window)]
 #[test]
 fn the_keyboard_is_enough() {

@@ -74,8 +74,8 @@ fn overlays_are_the_pictures_of_reports() {
     assert!(share < 0.1, "{share} of the lines differ");
 }
 
-/// What a turned camera sees lies beside the maps, although it may be no farther away than the slice
-/// ends.
+/// What a turned camera sees lies beside the maps, although it may be no farther away than the
+/// slice ends.
 #[needs(gpu)]
 #[test]
 fn what_no_map_holds_is_hatched() {

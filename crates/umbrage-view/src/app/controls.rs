@@ -41,8 +41,8 @@ impl Tip for Response {
     }
 }
 
-/// The areas that have tooltips in this frame, with their layers. That of a slider holds its number,
-/// and that of a plot its legend, which can be clicked.
+/// The areas that have tooltips in this frame, with their layers. That of a slider holds its
+/// number, and that of a plot its legend, which can be clicked.
 #[derive(Clone, Default)]
 pub(super) struct Tipped(pub(super) Vec<(LayerId, Rect)>);
 

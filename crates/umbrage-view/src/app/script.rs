@@ -50,8 +50,8 @@ struct Memory {
     buffers: u64,
 }
 
-/// Views and buffers of frames that are on their way, of which there are sometimes more than at other
-/// times.
+/// Views and buffers of frames that are on their way, of which there are sometimes more than at
+/// other times.
 const ON_THEIR_WAY: u64 = 8;
 
 /// No step takes longer than this.

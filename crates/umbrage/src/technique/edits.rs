@@ -76,9 +76,9 @@ pub fn written(text: &str, slot: Slot) -> Option<Written<'_>> {
     slot.read(Texts::of(text).ok()?.0[slot as usize].or(slot.default_text())?).ok()
 }
 
-/// The text with another word in a slot, as in `with_word("lispsm:vsm", Slot::Filter, Some("msm"))`;
-/// `None` takes the word away. The word has its value and may have options. Options that the former
-/// word has are kept if they go with the new one.
+/// The text with another word in a slot, as in `with_word("lispsm:vsm", Slot::Filter,
+/// Some("msm"))`; `None` takes the word away. The word has its value and may have options. Options
+/// that the former word has are kept if they go with the new one.
 ///
 /// # Errors
 /// An error if `text` is not a technique, if the word is not one of the slot's, or if it cannot be
@@ -99,10 +99,9 @@ pub fn with_word(text: &str, slot: Slot, word: Option<&str>) -> Result<String, P
     texts.with_options(slot, head, &options.collect::<Vec<_>>())
 }
 
-/// The text with an option of the word in a slot, as in
-/// `with_option("lispsm:vsm", Slot::Filter, "blur", Some("2px"))`; `None` takes the option away. The
-/// value is empty for options without one. Other options that exclude the new one are taken away,
-/// and what it needs is added.
+/// The text with an option of the word in a slot, as in `with_option("lispsm:vsm", Slot::Filter,
+/// "blur", Some("2px"))`; `None` takes the option away. The value is empty for options without one.
+/// Other options that exclude the new one are taken away, and what it needs is added.
 ///
 /// # Errors
 /// An error if `text` is not a technique or has no word in the slot, if the word has no such

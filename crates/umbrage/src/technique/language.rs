@@ -4,10 +4,10 @@
 //! options and a sentence about each. The parser, the printer's tests, [`help`] and the
 //! explanations in reports all use these tables.
 //!
-//! Two things help to write it, from the same tables. [`complete`] says what may stand at the cursor
-//! of a text field. A panel of controls needs no state beside the text: [`written`] tells what the
-//! text has in each [`Slot`], and [`with_word`] and [`with_option`] change it there. The parser
-//! decides which changes are possible, so a panel can try them to know what to grey out.
+//! Two things help to write it, from the same tables. [`complete`] says what may stand at the
+//! cursor of a text field. A panel of controls needs no state beside the text: [`written`] tells
+//! what the text has in each [`Slot`], and [`with_word`] and [`with_option`] change it there. The
+//! parser decides which changes are possible, so a panel can try them to know what to grey out.
 //!
 //! ```
 //! use umbrage::language::{Slot, complete, with_option, with_word, written};
@@ -48,7 +48,8 @@ pub struct Word {
     /// `lambda=NUMBER`. Empty for words without a value.
     pub value: &'static str,
     /// Numbers that a control offers for the value, one scale for each unit that it may have. Empty
-    /// for words without one. Where the value is a pair or a list, they are for each of its numbers.
+    /// for words without one. Where the value is a pair or a list, they are for each of its
+    /// numbers.
     pub scales: &'static [Scale],
     /// The word with a valid value: `pcf3`.
     pub example: &'static str,
