@@ -177,9 +177,9 @@ impl Command {
         Ok(match verb {
             "wait" => Self::Wait(Wait::parse(rest)?),
             "shoot" => {
-                let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-                if rest.is_empty() || !rest.chars().all(is_plain) {
-                    return Err("`shoot` needs a name of letters, digits, - and _".into());
+                let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+                if rest.is_empty() || rest.starts_with('.') || !rest.chars().all(is_plain) {
+                    return Err("`shoot` needs a name of letters, digits, -, _ and .".into());
                 }
                 Self::Shoot(rest.into())
             }
