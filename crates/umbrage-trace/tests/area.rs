@@ -134,6 +134,9 @@ fn leaves_need_more_rays_and_keep_the_stated_noise() {
         let found = area.visibility(&sample);
         assert!(f64::from(found.standard_error) <= AreaLight::STANDARD_ERROR, "{found:?}");
         assert_eq!(found, area.visibility(&sample), "the same rays again");
+        let glance = area.glance(&sample);
+        let off = (glance.visibility - 0.5).abs();
+        assert!(glance.rays < 200 && off <= 4.0 * glance.standard_error, "{glance:?}");
         // Of a disc with a radius of 17 bars, bars hide half to a thousandth.
         squares += (f64::from(found.visibility) - 0.5).powi(2);
     }

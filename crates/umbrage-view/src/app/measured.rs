@@ -129,10 +129,11 @@ impl Judged {
         self.counted_at = Some(Instant::now());
     }
 
-    /// Why there is no truth, and the share of it that is known.
-    pub(super) fn state(&self) -> Option<(Option<String>, f32)> {
+    /// Why there is no truth, and the shares of it that are known and exact.
+    pub(super) fn state(&self) -> Option<(Option<String>, [f32; 2])> {
         let truth = self.truth.as_ref()?.lock();
-        Some((truth.problem.clone(), truth.share))
+        let exact = if truth.soft.is_empty() { 1.0 } else { truth.exact };
+        Some((truth.problem.clone(), [truth.share, exact]))
     }
 
     /// The distance along the view of what a pixel shows, metres, as far as it is known.

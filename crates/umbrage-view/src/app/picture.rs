@@ -119,14 +119,16 @@ impl App<'_> {
         let errors = shown.tally.and_then(|t| Some((t.wrong_fraction()?, t.mean_abs_error()?)));
         match (self.judged.state(), errors) {
             (Some((Some(problem), _)), _) => text += &format!("\nno truth: {problem}"),
-            (Some((None, share)), None) if share < 1.0 => {
+            (Some((None, [share, _])), None) if share < 1.0 => {
                 text += &format!("\n{:.0}% traced", share * 100.0);
             }
-            (Some((None, share)), Some((wrong, mean))) => {
+            (Some((None, [share, exact])), Some((wrong, mean))) => {
                 let [wrong, mean] = [wrong, mean].map(|v| v * 100.0);
                 text += &format!("\nwrong {wrong:.2}%, mean error {mean:.2}%");
                 if share < 1.0 {
                     text += &format!(" ({:.0}% traced)", share * 100.0);
+                } else if exact < 1.0 {
+                    text += &format!(" (penumbrae {:.0}% exact)", exact * 100.0);
                 }
             }
             _ => {}

@@ -60,6 +60,9 @@ pub(crate) struct TruthPicture {
     pub(crate) step: u32,
     /// The share of the pixels that are known.
     pub(crate) share: f32,
+    /// The share of the rows in which `soft` is as exact as it will be. Before, it is known by few
+    /// rays.
+    pub(crate) exact: f32,
     /// Why there is no truth.
     pub(crate) problem: Option<String>,
     /// Seconds that tracing took.
@@ -84,7 +87,7 @@ impl TruthPicture {
 
     /// Whether all pixels are known, or none will be.
     pub(crate) fn is_done(&self) -> bool {
-        self.step == 1 || self.problem.is_some()
+        self.step == 1 && (self.soft.is_empty() || self.exact == 1.0) || self.problem.is_some()
     }
 
     /// The pixel that stands for a pixel: itself, or as long as it is not known the nearest one to
@@ -110,8 +113,8 @@ const STEPS: [u32; 4] = [8, 4, 2, 1];
 /// About how many rays are cast before others may see what they found, or another job may begin.
 const CHUNK: u32 = 1 << 13;
 
-/// About how many rays a pixel takes with a light that has a size.
-const AREA_RAYS: u32 = 64;
+/// About how many rays a pixel takes with a light that has a size, at a glance and exactly.
+const AREA_RAYS: [u32; 2] = [64, 1024];
 
 /// Traces the jobs that come, until there are none any more. A job ends early if another one comes,
 /// or if the number of the newest frame is no longer that of its own. `grew` is called whenever
@@ -175,7 +178,7 @@ pub(super) fn trace(
     let mut known = 0;
     for step in STEPS {
         let rows: Vec<u32> = (0..height).step_by(step as usize).collect();
-        let rays = if area.is_some() { AREA_RAYS } else { 1 };
+        let rays = if area.is_some() { AREA_RAYS[0] } else { 1 };
         for rows in rows.chunks((CHUNK * step / (width * rays)).max(1) as usize) {
             if is_out_of_date() {
                 return Ok(());
@@ -201,8 +204,59 @@ pub(super) fn trace(
         }
         job.picture.lock().step = step;
     }
-    job.picture.lock().version += 1;
+    if let Some(area) = &area
+        && !refine(&view, area, job, is_out_of_date, grew)
+    {
+        return Ok(());
+    }
+    let mut picture = job.picture.lock();
+    picture.seconds = start.elapsed().as_secs_f64();
+    picture.version += 1;
     Ok(())
+}
+
+/// Makes the penumbrae of a picture exact, which take most of the rays. Gives whether all are.
+fn refine(
+    view: &View<'_>,
+    area: &AreaLight<'_, '_>,
+    job: &TruthJob,
+    is_out_of_date: &dyn Fn() -> bool,
+    grew: &dyn Fn(),
+) -> bool {
+    let [width, height] = job.camera.image();
+    let at_a_time = (CHUNK * STEPS[0] / (width * AREA_RAYS[1])).max(1);
+    for first in (0..height).step_by(at_a_time as usize) {
+        if is_out_of_date() {
+            return false;
+        }
+        let rows = first..height.min(first + at_a_time);
+        let index = |x: u32, y: u32| (y * width + x) as usize;
+        let pixels: Vec<(u32, u32)> = {
+            let picture = job.picture.lock();
+            let is_penumbra = |&(x, y): &(u32, u32)| {
+                let soft = picture.soft[index(x, y)];
+                soft > 0.0 && soft < 1.0
+            };
+            rows.clone().flat_map(|y| (0..width).map(move |x| (x, y))).filter(is_penumbra).collect()
+        };
+        let exact = |&(x, y): &(u32, u32)| {
+            let sample = view.sample(DVec2::new(f64::from(x), f64::from(y)) + 0.5)?;
+            let visibility = area.visibility(&sample).visibility;
+            let color = displayed(shade::radiance(view.light(), &sample, visibility));
+            Some((index(x, y), visibility, color))
+        };
+        let found: Vec<_> = pixels.par_iter().filter_map(exact).collect();
+        let mut picture = job.picture.lock();
+        for (index, visibility, color) in found {
+            picture.soft[index] = visibility;
+            picture.color[index] = color;
+        }
+        picture.exact = rows.end as f32 / height as f32;
+        picture.version += 1;
+        drop(picture);
+        grew();
+    }
+    true
 }
 
 /// The pixels of a row that belong to a level and to none before it.
@@ -233,7 +287,7 @@ impl Pixel {
             return Self { sharp: 1.0, soft, depth, counts: false, color: displayed(sky) };
         };
         let sharp = view.truth(&sample);
-        let soft = area.map(|area| area.visibility(&sample).visibility);
+        let soft = area.map(|area| area.glance(&sample).visibility);
         let Sample { is_facing, depth, .. } = sample;
         let radiance = shade::radiance(view.light(), &sample, soft.unwrap_or(sharp));
         let counts = view.counts(is_facing, depth);
@@ -315,7 +369,12 @@ mod tests {
             shadowed += u32::from(picture.counts[i] && picture.sharp[i] == 0.0);
         }
         assert!(shadowed > 0, "{shadowed} pixels in shadow");
-        assert!(picture.soft.iter().any(|&v| v > 0.0 && v < 1.0), "a penumbra");
+        let area = AreaLight::new(&view, LightSize::Degrees(5.0)).unwrap();
+        let soft = band.map(|s| area.visibility(s).visibility, &|_| {});
+        let penumbra: Vec<usize> =
+            (0..soft.len()).filter(|&i| picture.soft[i] > 0.0 && picture.soft[i] < 1.0).collect();
+        assert!(penumbra.len() > 3, "{} pixels of a penumbra", penumbra.len());
+        assert!(penumbra.iter().all(|&i| picture.soft[i] == soft[i]), "exact in the end");
     }
 
     #[test]
