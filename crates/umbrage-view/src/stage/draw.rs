@@ -23,7 +23,7 @@ use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
 /// quick.
 const RENDERERS: usize = 2;
 
-/// Every so many frames, the time of a picture without lookups is measured.
+/// For so many frames the time of a picture without lookups counts, before it is measured again.
 const BARE_EVERY: u64 = 16;
 
 /// Rows of a picture that are read back at a time, so that a new request has not long to wait.
@@ -211,15 +211,15 @@ impl<'a> Artist<'a> {
         if let Err(e) = self.gpu.wait() {
             self.reporter.tell(News::Refused(e.to_string()));
         }
+        if self.bare.of(self.drawn, &request.camera).is_none() {
+            self.measure_bare(&request.camera, &light);
+        }
         let bare_ms = self.bare.of(self.drawn, &request.camera);
         for (easel, picture) in self.easels.iter_mut().zip(&mut pictures) {
             easel.read_times(self.gpu);
             if let (Some(times), Ok(drawn)) = (&easel.times, &mut picture.drawn) {
                 drawn.costs.add_times(times, bare_ms);
             }
-        }
-        if self.drawn % BARE_EVERY == 1 {
-            self.measure_bare(&request.camera, &light);
         }
         let frame = Arc::new(Frame { request, number, light, pictures, map, body });
         self.last = Some((Arc::clone(&frame), false));
@@ -346,9 +346,6 @@ impl<'a> Artist<'a> {
         }
         let frame = Arc::clone(frame);
         let Request { camera, wants_truth, planned_for, light_size, .. } = frame.request;
-        if self.bare.of(self.drawn, &camera).is_none() {
-            self.measure_bare(&camera, &frame.light);
-        }
         if !wants_truth || planned_for.is_some() {
             return;
         }
