@@ -72,17 +72,11 @@ impl<'a> RenderScene<'a> {
     /// # Errors
     /// An error if the GPU does not support the technique.
     pub fn executor(&self, technique: &Technique, fades: bool) -> Result<Executor<'_>, Error> {
-        let filter = technique.filter;
         let work = match self.gpu_for(technique) {
             Some((gpu, buffers)) => {
-                let options = ShadowOptions {
-                    filter,
-                    buffers: LookupBuffers::for_technique(technique, 1),
-                    fades,
-                    ..ShadowOptions::default()
-                };
+                let options = shadow_options(technique, fades);
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
-                let is_prefiltered = filter.prefilter().is_some();
+                let is_prefiltered = technique.filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
                 let tracer = &self.tracer;
                 Work::Gpu(Box::new(OnGpu { renderer, gpu, tracer, timer, has_maps: false }))
@@ -90,6 +84,17 @@ impl<'a> RenderScene<'a> {
             None => Work::Reference { tracer: &self.tracer, maps: None },
         };
         Ok(Executor { work })
+    }
+}
+
+/// The options of a technique's lookups. If `fades` is true, its plans' shadows may
+/// [fade out](umbrage::Plan::fade).
+pub fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
+    ShadowOptions {
+        filter: technique.filter,
+        buffers: LookupBuffers::for_technique(technique, 1),
+        fades,
+        ..ShadowOptions::default()
     }
 }
 

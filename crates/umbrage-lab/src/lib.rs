@@ -78,7 +78,7 @@ pub use casters::{MapCasters, casters, casters_culled};
 pub use comparison::{Compared, Comparison, ComparisonOptions};
 pub use defaults::Defaults;
 pub use error::{Difference, Error, Field, joined};
-pub use executor::{Executor, RenderScene, Scout, edge_on};
+pub use executor::{Executor, RenderScene, Scout, edge_on, shadow_options};
 pub use executors::{Backend, Executors, runs_on_gpu};
 pub use folder::{Contents, ReportFolder, check_file};
 pub use light::{ChosenLight, LightOptions, choose_light};

@@ -5,7 +5,7 @@ use crate::error::{Error, Field};
 use crate::scene::find;
 use crate::values;
 use glam::DVec3;
-use umbrage::{Aabb, Camera};
+use umbrage::Camera;
 use umbrage_scene::{Lens, Scene, SceneCamera};
 
 /// Largest ratio of far to near distance that is chosen. Depths beyond it have hardly any digits
@@ -180,7 +180,7 @@ pub fn choose_view(options: &ViewOptions, defaults: &Defaults<'_>) -> Result<Cho
     let mut notices = Vec::new();
     let is_from_file = own.as_ref().is_some_and(|own| own.word.is_some()) && !moved;
     if let Some(scene) = scene {
-        let end = || end_of(&view, scene.bounds());
+        let end = || view.end_of(scene.bounds());
         let far = match options.far {
             None if moved => Some(end()),
             // A camera of the file may reach as far as the sky, on which no map is spent.
@@ -245,11 +245,4 @@ fn own_camera(
         },
         None => OwnCamera { camera: defaults.view(scene).clone(), word: None },
     })
-}
-
-/// The far distance for a view from any position: where the scene ends.
-fn end_of(view: &SceneCamera, bounds: Aabb) -> f64 {
-    let forward = (view.target - view.eye).normalize_or(DVec3::NEG_Z);
-    let far = bounds.corners().iter().map(|&c| forward.dot(c - view.eye)).fold(0.0, f64::max);
-    if far > 0.0 { far * 1.01 } else { 100.0 }
 }

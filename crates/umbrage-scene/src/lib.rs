@@ -26,3 +26,4 @@ pub use types::{
     Alpha, Instance, Lens, Material, Mesh, Notice, Sampling, Scene, SceneCamera, SceneLight,
     Texture, TextureId, Wrap,
 };
+pub use view::side_planes;

@@ -179,6 +179,15 @@ impl SceneCamera {
             }
         }
     }
+
+    /// A far distance that reaches just behind a scene within these bounds, metres; 100 m if
+    /// nothing of them lies ahead. The camera's own depth range does not matter.
+    pub fn end_of(&self, bounds: Aabb) -> f64 {
+        let forward = (self.target - self.eye).normalize_or(DVec3::NEG_Z);
+        let depths = bounds.corners().map(|corner| forward.dot(corner - self.eye));
+        let farthest = depths.into_iter().fold(0.0, f64::max);
+        if farthest > 0.0 { farthest * 1.01 } else { 100.0 }
+    }
 }
 
 /// A light of the scene.

@@ -1,6 +1,6 @@
 //! Scripts that drive a window, for tests and documentation.
 
-use crate::action::Action;
+use crate::action::{Action, chosen};
 use crate::settings::{Compare, OverlayKind};
 use crate::sun::Sun;
 use glam::DVec3;
@@ -146,7 +146,9 @@ impl Command {
                 act(Action::Sun { azimuth_deg, elevation_deg })
             }
             Line::Overlay(None) => act(Action::Overlay(OverlayKind::None)),
-            Line::Overlay(Some(name)) => act(Action::parse(&format!("overlay {name}"))?),
+            Line::Overlay(Some(name)) => {
+                act(Action::Overlay(chosen("overlay", &name, &OverlayKind::ALL)?))
+            }
             Line::Size([width, height]) => {
                 match [width, height].map(|n| (1.0..=16384.0).contains(&n)) {
                     [true, true] => Ok(vec![Self::Size([width, height])]),

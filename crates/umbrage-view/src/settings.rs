@@ -4,9 +4,9 @@ use crate::pose::Pose;
 use crate::stage::{Overlay, Request, SceneInfo, Shining};
 use crate::sun::Sun;
 use umbrage::visibility::LightSize;
-use umbrage::{Aabb, Camera, Light, LookAt, Orthographic};
+use umbrage::{Aabb, Camera, Light};
 use umbrage_lab::{Fit, NamedTechnique, SceneOptions};
-use umbrage_scene::Lens;
+use umbrage_scene::{Lens, SceneCamera, side_planes};
 
 /// The state of a window. A session keeps what is seen: not whether dragging flies, errors are
 /// counted or fewer pixels are drawn, and the time of day as the sun that stands there.
@@ -158,7 +158,7 @@ impl Settings {
     }
 
     /// Takes the light that a scene begins with.
-    pub(crate) fn shine(&mut self, info: &SceneInfo) {
+    fn shine(&mut self, info: &SceneInfo) {
         self.light = match (&info.light_name, info.light) {
             (Some(name), _) => LightSetting::Named(name.clone()),
             (None, Light::Directional { direction }) => {
@@ -170,12 +170,7 @@ impl Settings {
     }
 
     /// Takes a view, which is that of the scene's camera of this name, if there is a name.
-    pub(crate) fn look_from(
-        &mut self,
-        name: Option<String>,
-        view: &umbrage_scene::SceneCamera,
-        info: &SceneInfo,
-    ) {
+    pub(crate) fn look_from(&mut self, name: Option<String>, view: &SceneCamera, info: &SceneInfo) {
         self.pose = Pose::new(view.eye, view.target, view.up);
         if self.pose.distance() > 0.999 * view.far {
             // Cameras of files have no target, and get one at the far distance. The view shall turn
@@ -223,18 +218,14 @@ impl Settings {
         image: [u32; 2],
     ) -> Result<Camera, umbrage::Error> {
         let &Pose { eye, target, up } = pose;
-        let wide = |near, far| match self.lens {
-            Lens::Perspective { fov_y_rad } => {
-                Camera::look_at(LookAt { eye, target, up, fov_y_rad, near, far, image })
-            }
-            Lens::Orthographic { height } => {
-                Camera::orthographic(Orthographic { eye, target, up, height, near, far, image })
-            }
-        };
         // Any range will do to find where the surfaces begin and end.
-        let [near, far] = depth_range(&wide(1e-3, 1e3)?, pose.distance(), info);
-        let far = self.far.unwrap_or(far);
-        wide(self.near.unwrap_or(near).min(far * 0.5), far)
+        let (name, near, far) = (String::new(), 1e-3, 1e3);
+        let mut view = SceneCamera { name, eye, target, up, lens: self.lens, near, far };
+        let end = view.end_of(info.bounds);
+        let near = near_end(&view.camera(image)?, end, pose.distance(), info);
+        view.far = self.far.unwrap_or(end);
+        view.near = self.near.unwrap_or(near).min(view.far * 0.5);
+        view.camera(image)
     }
 
     /// The light of a frame.
@@ -315,44 +306,29 @@ impl Settings {
     }
 }
 
-/// Where a view of a scene begins and ends, metres: before the nearest of the boxes around the
-/// surfaces that it sees, and behind the last one. The plan gains little from a nearer beginning,
-/// because it is fitted to the boxes anyway.
-fn depth_range(camera: &Camera, to_target: f64, info: &SceneInfo) -> [f64; 2] {
+/// Where a view of a scene that ends at `far` begins, metres: before the nearest of the boxes around
+/// the surfaces that it sees. The plan gains little from a later beginning, because it is fitted to
+/// the boxes anyway.
+fn near_end(camera: &Camera, far: f64, to_target: f64, info: &SceneInfo) -> f64 {
     /// Where the viewer is amid the surfaces, the view begins at this share of its far distance or
     /// of the distance to the target, whichever is less.
     const SHARES: [f64; 2] = [1.0 / 2000.0, 1.0 / 50.0];
-    let depths = |aabb: &Aabb| aabb.corners().map(|corner| camera.depth(corner));
-    let farthest = depths(&info.bounds).into_iter().fold(0.0, f64::max);
-    let far = if farthest > 0.0 { farthest * 1.01 } else { 100.0 };
     if camera.is_orthographic() {
-        return [0.0, far];
+        return 0.0;
     }
+    let depths = |aabb: &Aabb| aabb.corners().map(|corner| camera.depth(corner));
     let sides = side_planes(camera);
     let seen =
         info.boxes.iter().filter(|b| !b.is_empty() && sides.iter().all(|p| p.may_touch(**b)));
     let nearest = seen.flat_map(depths).fold(f64::INFINITY, f64::min);
     let least = (far * SHARES[0]).min(to_target * SHARES[1]).max(far * 1e-6);
-    [nearest.clamp(least, far / 2.0) * 0.99, far]
-}
-
-/// The planes of the picture's sides, which point inwards.
-fn side_planes(camera: &Camera) -> [umbrage::Plane; 4] {
-    let [width, height] = camera.image().map(f64::from);
-    let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
-    let rays = corners.map(|corner| camera.ray(corner.into()).direction);
-    std::array::from_fn(|i| {
-        let normal = rays[i].cross(rays[(i + 1) % 4]).normalize_or_zero();
-        let inward = if normal.dot(camera.forward()) < 0.0 { -normal } else { normal };
-        umbrage::Plane::through(camera.eye(), inward)
-    })
+    nearest.clamp(least, far / 2.0) * 0.99
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
     use glam::DVec3;
-    use umbrage_scene::SceneCamera;
 
     /// A scene of one box, with a camera and two lights.
     pub(crate) fn info() -> SceneInfo {

@@ -117,11 +117,10 @@ impl From<MotionArg> for Motion {
 impl Compare {
     /// Takes what is not asked for from the session, if there is one.
     pub(super) fn take_session(&mut self) -> Result<()> {
-        let Some(session) = self.scene.session.read()? else { return Ok(()) };
+        let Some(session) = self.scene.take_session(&mut self.view, &mut self.light)? else {
+            return Ok(());
+        };
         let told = self.scene.session.told;
-        self.scene.take(&session);
-        self.light.take(session.light_options());
-        self.view.take(session.view, told.size);
         let comparison = &mut self.comparison;
         comparison.light_size = comparison.light_size.or(session.light_size);
         if !told.shadows {

@@ -102,11 +102,10 @@ impl Render {
 
     /// Takes what is not asked for from the session, if there is one.
     pub(super) fn take_session(&mut self) -> Result<()> {
-        let Some(session) = self.scene.session.read()? else { return Ok(()) };
+        let Some(session) = self.scene.take_session(&mut self.view, &mut self.light)? else {
+            return Ok(());
+        };
         let told = self.scene.session.told;
-        self.scene.take(&session);
-        self.light.take(session.light_options());
-        self.view.take(session.view, told.size);
         if !told.shadows
             && let Some(shown) = session.techniques.into_iter().next()
         {

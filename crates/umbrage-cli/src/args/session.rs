@@ -1,6 +1,6 @@
 //! `--session`: scene, view, light and techniques from a file.
 
-use super::view::SceneChangeArgs;
+use super::view::{LightArgs, SceneChangeArgs, ViewArgs};
 use anyhow::Result;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args};
@@ -65,10 +65,19 @@ impl SessionSceneArgs {
         self.name.as_deref().unwrap_or_default()
     }
 
-    /// Takes the session's scene.
-    pub(super) fn take(&mut self, session: &Session) {
+    /// Takes what is not asked for of the scene, the view and the light from the session, and
+    /// returns the session for the rest; `None` if there is none.
+    pub(super) fn take_session(
+        &mut self,
+        view: &mut ViewArgs,
+        light: &mut LightArgs,
+    ) -> Result<Option<Session>> {
+        let Some(session) = self.session.read()? else { return Ok(None) };
         self.name = Some(session.scene.clone());
-        self.changes.take(session);
+        self.changes.take(&session);
+        light.take(session.light_options());
+        view.take(session.view.clone(), self.session.told.size);
+        Ok(Some(session))
     }
 }
 

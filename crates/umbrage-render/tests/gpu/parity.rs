@@ -151,7 +151,11 @@ fn agrees(name: &str, indices: impl IntoIterator<Item = usize>) {
 
 /// Compares one technique in a scene's default light.
 pub(crate) fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
-    let light = set.light();
+    agrees_under(name, set, set.light(), technique);
+}
+
+/// Compares one technique in a light.
+fn agrees_under(name: &str, set: &Set<'_>, light: Light, technique: &Technique) {
     let plan = set.plan(&[light], technique);
     let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
@@ -639,13 +643,7 @@ fn a_million_metres_from_the_origin() {
     set.camera = look.camera(IMAGE).unwrap();
     let light = near.default_light().light;
     for text in &TECHNIQUES[3..5] {
-        let technique = technique(text, Filter::Hard);
-        let plan = set.plan(&[light], &technique);
-        let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
-        let samples = draw(&set, &plan, &shading, &ShadowOptions::default(), GPU.support());
-        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
-        let difference = compare(&set, &plan, (0, &light), &samples, &reference);
-        check("pole", &technique, &difference);
+        agrees_under("pole", &set, light, &technique(text, Filter::Hard));
     }
 }
 
@@ -666,13 +664,7 @@ fn a_mesh_far_from_its_own_origin() {
     look.target += offset.as_dvec3();
     set.camera = look.camera(IMAGE).unwrap();
     let light = near.default_light().light;
-    let technique = technique(TECHNIQUES[4], Filter::Hard);
-    let plan = set.plan(&[light], &technique);
-    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
-    let samples = draw(&set, &plan, &shading, &ShadowOptions::default(), GPU.support());
-    let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
-    let difference = compare(&set, &plan, (0, &light), &samples, &reference);
-    check("pole", &technique, &difference);
+    agrees_under("pole", &set, light, &technique(TECHNIQUES[4], Filter::Hard));
 }
 
 /// Maps stay where they are when the camera moves away from that of their plan, and surfaces that

@@ -6,6 +6,8 @@ mod lighting;
 mod nearest;
 mod occupancy;
 
+pub use nearest::side_planes;
+
 use crate::types::{Lens, Scene, SceneCamera, SceneLight};
 use candidates::{around, is_room, within};
 use glam::{DVec3, Vec3};

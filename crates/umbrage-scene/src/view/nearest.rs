@@ -15,7 +15,7 @@ impl Scene {
     /// surfaces that an alpha mask removes count as if they were there. Surfaces that the camera
     /// sees exactly edge-on do not count.
     pub fn nearest_depth(&self, camera: &Camera) -> Option<f64> {
-        let sides = sides(camera);
+        let sides = side_planes(camera);
         let in_view = |aabb: Aabb| !aabb.is_empty() && sides.iter().all(|p| p.may_touch(aabb));
         let least_depth = |aabb: Aabb| {
             let depths = aabb.corners().map(|corner| camera.depth(corner));
@@ -39,8 +39,8 @@ impl Scene {
     }
 }
 
-/// The planes of the picture's four sides, which point inwards.
-fn sides(camera: &Camera) -> [Plane; 4] {
+/// The planes of the four sides of a camera's picture, which point inwards.
+pub fn side_planes(camera: &Camera) -> [Plane; 4] {
     let [width, height] = camera.image().map(f64::from);
     let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
     let ray = |x: f64, y: f64| camera.ray(glam::DVec2::new(x, y));

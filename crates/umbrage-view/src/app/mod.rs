@@ -254,9 +254,7 @@ impl<'k> App<'k> {
         let Some((to_open, ..)) = self.opening.take() else { return };
         let ToOpen { mut settings, view, clip, kind, .. } = to_open;
         if kind == Kind::Scene {
-            let changes = settings.changes;
             settings = ToOpen::scene(&settings.scene, &self.kept.settings).settings;
-            settings.changes = changes;
         }
         if kind != Kind::Again {
             let is_headlight = settings.light == LightSetting::Headlight;

@@ -216,7 +216,7 @@ pub(super) fn drawn(frame: &crate::stage::Frame, index: usize) -> Option<&DrawnP
 }
 
 /// Fills a rectangle with a texture.
-fn paint(painter: &Painter, rect: Rect, id: TextureId) {
+pub(super) fn paint(painter: &Painter, rect: Rect, id: TextureId) {
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     painter.image(id, rect, whole, Color32::WHITE);
 }

@@ -5,7 +5,7 @@ use super::controls::{Tip, thousands};
 use super::input::KEYS;
 use super::lines::{BODY, VIEW, lines, map_color, map_name, paint_from_light, paint_in_map};
 use super::measured::History;
-use super::picture::drawn;
+use super::picture::{drawn, paint};
 use crate::action::{Action, Panel};
 use crate::stage::{Costs, Job};
 use egui::{Color32, ComboBox, Grid, Pos2, Rect, RichText, Sense, Stroke, Ui, Window, vec2};
@@ -292,8 +292,7 @@ impl App<'_> {
         let most = (ui.available_width() / w).min(380.0 / h);
         let (rect, response) = ui.allocate_exact_size(vec2(w * most, h * most), Sense::hover());
         response.on_hover_text("Depths as the light sees them: what is nearer to it is lighter.");
-        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-        ui.painter().image(shown.id, rect, whole, Color32::WHITE);
+        paint(ui.painter(), rect, shown.id);
         let planned_for = frame.request.planned_for.unwrap_or(frame.request.camera);
         paint_in_map(ui.painter(), rect, map, &planned_for);
     }

@@ -10,14 +10,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles, Technique};
+use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles};
 use umbrage_lab::{
     Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, milliseconds,
-    plan_with, planner, runs_on_gpu,
+    plan_with, planner, runs_on_gpu, shadow_options,
 };
 use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
 use umbrage_trace::Tracer;
-use umbrage_wgpu::{Casters, LookupBuffers, ShadowOptions};
+use umbrage_wgpu::{Casters, ShadowOptions};
 
 /// The number of techniques' renderers that each picture keeps, so that changing to and fro is
 /// quick.
@@ -42,7 +42,8 @@ pub(super) struct Artist<'a> {
     bare: Bare<'a>,
     /// For pictures of maps.
     map_targets: Targets,
-    receivers: Vec<(Fit, Receivers)>,
+    /// The receivers for [`Fit::Box`]. Those for other fits are the same boxes around surfaces.
+    in_box: Receivers,
     scout: Option<Scout<'a>>,
     posed: Option<Posed>,
     /// The last frame, and whether its truth and errors were asked for.
@@ -142,7 +143,7 @@ impl<'a> Artist<'a> {
                 measured: None,
             },
             map_targets: Targets::default(),
-            receivers: Vec::new(),
+            in_box: Receivers::in_box(prepared.render().tracer().scene()),
             scout: None,
             posed: None,
             last: None,
@@ -243,7 +244,8 @@ impl<'a> Artist<'a> {
         let posed = self.posed.as_ref().filter(|posed| !posed.is_at_rest());
         let receivers = match posed {
             Some(posed) => posed.receivers(request.fit),
-            None => receivers(&mut self.receivers, self.prepared, request.fit),
+            None if request.fit == Fit::Box => &self.in_box,
+            None => self.prepared.receivers(),
         };
         let bounds = receivers.bounds(seen);
         while self.easels.len() <= index {
@@ -377,30 +379,6 @@ impl<'a> Artist<'a> {
 
 /// The longest side of the picture of a map, pixels.
 const MAP_SIDE: u32 = 1024;
-
-/// The receivers for a fit, found when they are first needed.
-fn receivers<'r>(
-    known: &'r mut Vec<(Fit, Receivers)>,
-    prepared: &PreparedScene<'_>,
-    fit: Fit,
-) -> &'r Receivers {
-    let index = known.iter().position(|(f, _)| *f == fit).unwrap_or_else(|| {
-        let tracer = prepared.render().tracer();
-        known.push((fit, Receivers::new(tracer.scene(), tracer, fit)));
-        known.len() - 1
-    });
-    &known[index].1
-}
-
-/// The options of a technique's lookups.
-pub(super) fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
-    ShadowOptions {
-        filter: technique.filter,
-        buffers: LookupBuffers::for_technique(technique, 1),
-        fades,
-        ..ShadowOptions::default()
-    }
-}
 
 impl<'a> Easel<'a> {
     fn new(gpu: &Gpu) -> Self {

@@ -1,6 +1,5 @@
 //! Jobs that take long, beside the frames: measuring techniques, saving pictures and turntables.
 
-use super::draw::shadow_options;
 use super::errors::{Visibility, errors};
 use super::mailbox::Mailbox;
 use super::request::{Frame, Request};
@@ -15,6 +14,7 @@ use umbrage::visibility::{Filter, LightSize};
 use umbrage::{Camera, Light, Plan};
 use umbrage_lab::{
     Bencher, NamedTechnique, PreparedScene, Rows, edge_on, milliseconds, plan, plan_fading,
+    shadow_options,
 };
 use umbrage_measure::Image;
 use umbrage_render::{FrameTarget, Gpu, Renderer, Shading};

@@ -1,5 +1,6 @@
 //! A scene in motion.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 use umbrage::Aabb;
 use umbrage_lab::{Fit, Receivers};
@@ -10,16 +11,15 @@ use umbrage_scene::Scene;
 pub(super) struct Posed {
     scene: Scene,
     moment: Option<(usize, f64)>,
-    receivers: Receivers,
-    in_box: Receivers,
+    /// Found when a picture of this pose first needs them.
+    around_instances: OnceCell<Receivers>,
+    in_box: OnceCell<Receivers>,
 }
 
 impl Posed {
     pub(super) fn new(rest: &Scene) -> Self {
-        let scene = without_textures(rest);
-        let receivers = Receivers::around_instances(&scene);
-        let in_box = Receivers::in_box(&scene);
-        Self { scene, moment: None, receivers, in_box }
+        let (around_instances, in_box) = (OnceCell::new(), OnceCell::new());
+        Self { scene: without_textures(rest), moment: None, around_instances, in_box }
     }
 
     /// Whether the scene is at rest, as it was opened.
@@ -42,8 +42,10 @@ impl Posed {
     /// What maps are fitted to. Boxes around surfaces are those around instances.
     pub(super) fn receivers(&self, fit: Fit) -> &Receivers {
         match fit {
-            Fit::Box => &self.in_box,
-            Fit::Surfaces | Fit::Seen => &self.receivers,
+            Fit::Box => self.in_box.get_or_init(|| Receivers::in_box(&self.scene)),
+            Fit::Surfaces | Fit::Seen => {
+                self.around_instances.get_or_init(|| Receivers::around_instances(&self.scene))
+            }
         }
     }
 
@@ -61,8 +63,8 @@ impl Posed {
         self.moment = moment;
         let (clip, seconds) = moment.map_or((None, 0.0), |(clip, seconds)| (Some(clip), seconds));
         let moved = self.scene.pose(clip, seconds);
-        self.receivers = Receivers::around_instances(&self.scene);
-        self.in_box = Receivers::in_box(&self.scene);
+        self.around_instances.take();
+        self.in_box.take();
         buffers.pose(gpu, &self.scene, &moved).map_err(|e| e.to_string())
     }
 }
