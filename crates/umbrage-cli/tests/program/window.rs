@@ -319,17 +319,21 @@ fn animations_play() {
     script += &shoot("seek 0.5", "ready", "half");
     script += &shoot("compare wipe; wipe 0", "truth", "truth");
     script += &shoot("compare alone; seek 0; play on", "0.4 s", "playing");
+    script += &shoot("play on", "0.3 s", "later");
     script += &shoot("play off; clip 0", "ready", "again");
     let run = windows.script("stage.gltf", &script);
-    let names = ["rest", "begin", "end", "half", "truth", "playing", "again"];
-    let [rest, begin, end, half, truth, playing, again] = names.map(|name| run.shot(name));
+    let names = ["rest", "begin", "end", "half", "truth", "playing", "later", "again"];
+    let [rest, begin, end, half, truth, playing, later, again] = names.map(|name| run.shot(name));
     begin.is_fine().is_like(&rest, 0.1);
     again.is_like(&rest, 0.01);
     end.is_unlike(&begin, 1.0);
     half.is_unlike(&begin, 1.0);
     half.is_unlike(&end, 1.0);
     truth.is_like(&half, 1.0);
-    playing.is_unlike(&begin, 0.5);
+    // On a busy machine frames may come so late that the clip is back at its begin, but not twice.
+    let whole = [0.0, 1.0];
+    let moved = [playing, later].map(|shot| shot.difference(&begin, whole, whole));
+    assert!(moved.iter().any(|&moved| moved >= 0.5), "{moved:?}");
 }
 
 /// Two thousand frames later as much memory is in use as before.
