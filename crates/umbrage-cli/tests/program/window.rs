@@ -70,8 +70,8 @@ fn techniques() -> Vec<String> {
     all.concat()
 }
 
-/// Writes `stage.gltf`: a box that slides over a floor within a second, two cameras and three
-/// lights.
+/// Writes `stage.gltf`: a box that slides over a floor within a second and rests there for a minute,
+/// two cameras and three lights. So a playing clip is not back at its begin when frames come late.
 fn write_stage(windows: &Windows) {
     let blocks: [Block<'_>; 2] =
         [("Floor", [0.0, -0.5, 0.0], [5.0, 0.5, 5.0]), ("Box", [-2.0, 1.0, 0.0], [0.5, 1.0, 0.5])];
@@ -79,8 +79,10 @@ fn write_stage(windows: &Windows) {
         json!({"bufferView": 2, "byteOffset": offset, "componentType": 5126, "count": count,
                "type": kind})
     };
-    let keys = [0.0, 1.0, -2.0, 1.0, 0.0, 2.0, 1.0, 0.0f32];
-    let keys: Vec<u8> = keys.into_iter().flat_map(f32::to_le_bytes).collect();
+    let times = [0.0, 1.0, 60.0f32];
+    let places = [[-2.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 1.0, 0.0f32]];
+    let keys = times.into_iter().chain(places.into_iter().flatten());
+    let keys: Vec<u8> = keys.flat_map(f32::to_le_bytes).collect();
     std::fs::write(windows.desk.path("keys.bin"), keys).unwrap();
     let corners = json!({"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3",
                          "min": [-1, -1, -1], "max": [1, 1, 1]});
@@ -89,15 +91,15 @@ fn write_stage(windows: &Windows) {
     let down = [-half, 0.0, 0.0, half];
     let light = |i: u32| json!({"KHR_lights_punctual": {"light": i}});
     let more = json!({
-        "accessors": [corners, indices, floats(2, "SCALAR", 0), floats(2, "VEC3", 8)],
+        "accessors": [corners, indices, floats(3, "SCALAR", 0), floats(3, "VEC3", 12)],
         "bufferViews": [
             {"buffer": 0, "byteLength": 96},
             {"buffer": 0, "byteOffset": 96, "byteLength": 72},
-            {"buffer": 1, "byteLength": 32},
+            {"buffer": 1, "byteLength": 48},
         ],
         "buffers": [
             {"byteLength": 168, "uri": "box.bin"},
-            {"byteLength": 32, "uri": "keys.bin"},
+            {"byteLength": 48, "uri": "keys.bin"},
         ],
         "animations": [{
             "name": "Slide", "samplers": [{"input": 2, "output": 3}],
@@ -318,22 +320,18 @@ fn animations_play() {
     script += &shoot("seek 1", "ready", "end");
     script += &shoot("seek 0.5", "ready", "half");
     script += &shoot("compare wipe; wipe 0", "truth", "truth");
-    script += &shoot("compare alone; seek 0; play on", "0.4 s", "playing");
-    script += &shoot("play on", "0.3 s", "later");
+    script += &shoot("compare alone; seek 0; play on", "2 s", "playing");
     script += &shoot("play off; clip 0", "ready", "again");
     let run = windows.script("stage.gltf", &script);
-    let names = ["rest", "begin", "end", "half", "truth", "playing", "later", "again"];
-    let [rest, begin, end, half, truth, playing, later, again] = names.map(|name| run.shot(name));
+    let names = ["rest", "begin", "end", "half", "truth", "playing", "again"];
+    let [rest, begin, end, half, truth, playing, again] = names.map(|name| run.shot(name));
     begin.is_fine().is_like(&rest, 0.1);
     again.is_like(&rest, 0.01);
     end.is_unlike(&begin, 1.0);
     half.is_unlike(&begin, 1.0);
     half.is_unlike(&end, 1.0);
     truth.is_like(&half, 1.0);
-    // On a busy machine frames may come so late that the clip is back at its begin, but not twice.
-    let whole = [0.0, 1.0];
-    let moved = [playing, later].map(|shot| shot.difference(&begin, whole, whole));
-    assert!(moved.iter().any(|&moved| moved >= 0.5), "{moved:?}");
+    playing.is_unlike(&begin, 0.5);
 }
 
 /// Two thousand frames later as much memory is in use as before.
