@@ -5,7 +5,7 @@ use bytemuck::Zeroable;
 use sha2::{Digest, Sha256};
 use std::io::{self, Read, Write};
 
-/// The version of the format that [`write`] writes and [`read`] reads.
+/// The version of the format that [`write()`] writes and [`read`] reads.
 pub const FORMAT_VERSION: u32 = 1;
 
 const MAGIC: [u8; 8] = *b"UMBCLUST";
@@ -52,7 +52,8 @@ pub enum FileError {
     },
 }
 
-/// Writes the clusters of all meshes of a scene, which has this [`fingerprint`](crate::fingerprint).
+/// Writes the clusters of all meshes of a scene, which has this
+/// [`fingerprint`](crate::fingerprint).
 ///
 /// # Errors
 ///
@@ -134,7 +135,7 @@ fn put_ball(bytes: &mut Vec<u8>, ball: &Ball) {
     }
 }
 
-/// Reads what [`write`] wrote. `length` is that of the whole file in bytes, `fingerprint` the
+/// Reads what [`write()`] wrote. `length` is that of the whole file in bytes, `fingerprint` the
 /// scene's, and `vertices` the number of vertices of each of its meshes.
 ///
 /// Memory is only taken for what a file of this length can hold. The result passes

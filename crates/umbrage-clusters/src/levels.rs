@@ -225,19 +225,20 @@ fn coarser(
     let corners: Vec<_> = old.iter().flat_map(Draft::corners).collect();
     let part = Part::new(source, &corners);
     let most = ((1.0 - min_gain) * corners.len() as f32) as usize;
-    let Some((triangles, deviation)) = simplify(source, &part, target, most, is_border) else {
-        return Outcome::Stuck(old);
+    let deviation = |triangles: &[[u32; 3]]| match whole {
+        Some(whole) => whole.deviation(source, &part.triangles_in(whole, triangles)),
+        None => part.deviation(source, triangles),
     };
-    // By the triangle inequality, nothing lies farther from the mesh than the finer clusters do
-    // from it and the coarser ones from these.
+    let simplified = simplify(source, &part, target, most, is_border, deviation);
+    let Some((triangles, deviation)) = simplified else { return Outcome::Stuck(old) };
     let below = old.iter().map(|draft| draft.error).fold(0.0, f32::max);
-    let mut error = (below + deviation).next_up();
-    if let Some(whole) = whole {
-        let corners = triangles.iter().map(|t| t.map(|i| part.vertices[i as usize]));
-        let place = |v: u32| whole.vertices.partition_point(|&other| other < v) as u32;
-        let triangles: Vec<_> = corners.map(|t| t.map(place)).collect();
-        error = error.min(whole.deviation(source, &triangles).max(below.next_up()));
-    }
+    let error = match whole {
+        // Measured from the mesh. Errors must grow all the same, or else cuts would have gaps.
+        Some(_) => deviation.max(below.next_up()),
+        // By the triangle inequality, nothing lies farther from the mesh than the finer clusters
+        // do from it and the coarser ones from these.
+        None => (below + deviation).next_up(),
+    };
     let bounds = Ball::around(old.iter().map(|draft| draft.error_bounds));
     let level = old.iter().map(|draft| draft.level).max().unwrap_or(0) + 1;
     let mut new = split(&part, &triangles);

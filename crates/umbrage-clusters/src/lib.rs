@@ -2,7 +2,7 @@
 //! Virtualized Geometry*, SIGGRAPH 2021.
 //!
 //! Every cluster knows how far it lies from the mesh, measured both ways and in metres: see
-//! [`Cluster::error`]. [`build`] makes clusters; [`write`] and [`read`] keep them in files, whose
+//! [`Cluster::error`]. [`build`] makes clusters; [`write()`] and [`read`] keep them in files, whose
 //! format `FORMAT.md` describes.
 
 mod ball;

@@ -153,6 +153,15 @@ impl Part {
         Self { vertices, positions, snapped, triangles }
     }
 
+    /// Triangles with this part's vertices as triangles with those of a part that contains it.
+    pub(crate) fn triangles_in(&self, other: &Part, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+        let place = |i: u32| {
+            let vertex = self.vertices[i as usize];
+            other.vertices.partition_point(|&other| other < vertex) as u32
+        };
+        triangles.iter().map(|t| t.map(place)).collect()
+    }
+
     /// The center and half the largest extent.
     pub(crate) fn extent(&self) -> (DVec3, f64) {
         let low = self.positions.iter().fold(Vec3::INFINITY, |a, &b| a.min(b)).as_dvec3();

@@ -17,15 +17,16 @@ const OPAQUE_UV_WEIGHT: f32 = 0.25;
 /// slivers did not prevent it.
 const SUSPICIOUS: f64 = 0.1;
 
-/// Simplification of `part` to `target` triangles, or as near to that as possible, and its
-/// deviation in metres; nothing if more than `most` triangles remain. Vertices stay where
-/// `is_fixed`. The triangles have the part's vertices; there is at least one.
+/// Simplification of `part` to `target` triangles, or as near to that as possible, and what it is
+/// off by in metres, as `deviation` finds; nothing if more than `most` triangles remain. Vertices
+/// stay where `is_fixed`. The triangles have the part's vertices; there is at least one.
 pub(crate) fn simplify(
     source: &Source,
     part: &Part,
     target: usize,
     most: usize,
     is_fixed: impl Fn(u32) -> bool,
+    deviation: impl Fn(&[[u32; 3]]) -> f32,
 ) -> Option<(Vec<[u32; 3]>, f32)> {
     let locks: Vec<SimplifyVertex> = part
         .vertices
@@ -37,7 +38,7 @@ pub(crate) fn simplify(
         if triangles.is_empty() {
             triangles.extend(largest(part));
         }
-        let deviation = part.deviation(source, &triangles);
+        let deviation = deviation(&triangles);
         (triangles, deviation)
     };
 

@@ -8,8 +8,8 @@ use common::{Random, all, corners, cut};
 use distance::Surface;
 use umbrage_clusters::build;
 
-/// Run with `--nocapture` for the table of true and stated errors, and with `UMBRAGE_POINTS=1000000`
-/// to compare at more points.
+/// Run with `--nocapture` for the table of true and stated errors, and with
+/// `UMBRAGE_POINTS=1000000` to compare at more points.
 #[test]
 fn no_point_of_a_cut_or_of_the_mesh_is_farther_from_the_other_than_stated() {
     let points = std::env::var("UMBRAGE_POINTS").map_or(6_000, |n| n.parse().unwrap());
