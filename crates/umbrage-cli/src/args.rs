@@ -5,6 +5,7 @@ mod compare;
 mod info;
 mod picture;
 mod plan;
+mod prepare;
 mod session;
 mod technique;
 pub(crate) mod theory;
@@ -15,6 +16,7 @@ pub(crate) use compare::{Compare, Sweep};
 pub(crate) use info::Info;
 pub(crate) use picture::{Aov, PictureArgs, PictureKind, Render};
 pub(crate) use plan::Plan;
+pub(crate) use prepare::Prepare;
 pub(crate) use view::{SceneArgs, SceneChangeArgs, ViewArgs};
 pub(crate) use window::Window;
 
@@ -63,6 +65,8 @@ pub(crate) enum Command {
     View(Window),
     /// Print the matrices, resolutions and errors that an engine needs.
     Plan(Plan),
+    /// Make the levels of detail of a scene ahead, for huge ones.
+    Prepare(Prepare),
     /// Tell what is in a scene: cameras, lights, sizes, and the view and light that would be taken.
     Info(Info),
     /// List the built-in scenes.
@@ -174,7 +178,8 @@ pub(crate) fn parse(
         Command::Sweep(sweep) => sweep.comparison.techniques.check(),
         Command::Plan(plan) => plan.check(),
         Command::Info(info) => info.check(),
-        Command::Scenes(_)
+        Command::Prepare(_)
+        | Command::Scenes(_)
         | Command::Figures(_)
         | Command::View(_)
         | Command::Devices(_)

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::time::Instant;
 use umbrage::{Bounds, Plan, Planner};
 use umbrage_lab::{
-    Bencher, Costs, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
+    Bencher, Costs, Detail, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
     milliseconds, plan, plan_with, planner,
 };
 use umbrage_measure::{LightInfo, View};
@@ -133,7 +133,8 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     bar.stage("preparing the scene");
     let techniques = &args.techniques.shadows;
     let executors = Executors::open(args.techniques.execution.backend.into(), techniques)?;
-    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque)?;
+    let detail = Detail::new(&scene, &executors, &args.techniques.execution.detail(), &bar)?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque, &detail)?;
     let tracer = render_scene.tracer();
     let view = umbrage_trace::View::new(tracer, camera, chosen_light.light, 1)?;
     let receivers = Receivers::new(&scene, tracer, args.techniques.fit.into());

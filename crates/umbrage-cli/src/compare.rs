@@ -6,7 +6,7 @@ use crate::progress::Bar;
 use crate::setup::{announce, open_changed, tell_notices};
 use anyhow::Result;
 use umbrage_lab::{
-    Comparison, Contents, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, Progress,
+    Comparison, Contents, Detail, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, Progress,
     ReportFolder,
 };
 use umbrage_measure::{Measured, Report, TruthKind};
@@ -19,8 +19,9 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     bar.stage("preparing the scene");
     let techniques = &args.comparison.techniques;
     let executors = Executors::open(techniques.execution.backend.into(), &techniques.shadows)?;
-    let prepared =
-        PreparedScene::new(&scene, &executors, args.scene.changes.opaque, techniques.fit.into())?;
+    let detail = Detail::new(&scene, &executors, &techniques.execution.detail(), &bar)?;
+    let (opaque, fit) = (args.scene.changes.opaque, techniques.fit.into());
+    let prepared = PreparedScene::new(&scene, &executors, opaque, fit, &detail)?;
     let options = args.comparison.options();
     let (view, light) = (args.view.options(), args.light.options());
     bar.stage("planning");

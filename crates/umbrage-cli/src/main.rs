@@ -10,6 +10,7 @@ mod figures;
 mod info;
 mod output;
 mod plan;
+mod prepare;
 mod progress;
 mod render;
 mod scenes;
@@ -51,6 +52,7 @@ fn run(command: &Command, quiet: bool) -> anyhow::Result<()> {
         Command::Compare(args) => compare::run(args, quiet),
         Command::Sweep(args) => sweep::run(args, quiet),
         Command::Plan(args) => plan::run(args, quiet),
+        Command::Prepare(args) => prepare::run(args, quiet),
         Command::Info(args) => info::run(args, quiet),
         Command::Scenes(args) => scenes::run(args),
         Command::Figures(args) => figures::run(args, quiet),

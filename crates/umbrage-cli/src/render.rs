@@ -7,8 +7,8 @@ use crate::setup::{Chosen, announce, choose, open_changed, tell_chosen, tell_not
 use anyhow::{Context, Result};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
-    Certainty, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers, RenderScene,
-    Rows, Shadowed, Shape, Texels, check_file, noise, plan, plan_fading,
+    Certainty, Detail, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers,
+    RenderScene, Rows, Shadowed, Shape, Texels, check_file, noise, plan, plan_fading,
 };
 use umbrage_measure::{
     ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
@@ -51,7 +51,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     bar.stage("preparing the scene");
     let backend = args.execution.backend.into();
     let executors = Executors::open(backend, std::slice::from_ref(&args.shadows))?;
-    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque)?;
+    let detail = Detail::new(&scene, &executors, &args.execution.detail(), &bar)?;
+    let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque, &detail)?;
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     if let Some(size) = args.light_size {

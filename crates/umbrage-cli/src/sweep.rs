@@ -19,6 +19,7 @@ pub(crate) fn run(args: &args::Sweep, quiet: bool) -> Result<()> {
         max_error: techniques.texels.max_error,
         fit: techniques.fit.into(),
         backend: techniques.execution.backend.into(),
+        detail: techniques.execution.detail(),
         opaque: args.changes.opaque,
         scene: args.changes.options(),
         size: args.size,

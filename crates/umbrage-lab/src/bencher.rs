@@ -137,6 +137,8 @@ fn frame_on_gpu(
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter_ms).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
+    // The first frame found out how much room there must be.
+    renderer.run_ahead();
     Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn) })
 }
 

@@ -53,6 +53,10 @@ pub enum Field {
     Animation,
     /// Time in the animation.
     Time,
+    /// Whether all triangles are drawn.
+    FullDetail,
+    /// The file with levels of detail.
+    Clusters,
     /// Nodes of the scene that are left out.
     Without,
     /// Whether ground is put under the scene.
@@ -99,6 +103,8 @@ impl Field {
             Self::Opaque => "opaque",
             Self::Animation => "animation",
             Self::Time => "time",
+            Self::FullDetail => "full-detail",
+            Self::Clusters => "clusters",
             Self::Without => "without",
             Self::Ground => "ground",
             Self::Backend => "backend",

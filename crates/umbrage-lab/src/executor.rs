@@ -1,5 +1,6 @@
 //! Executors, which render shadow maps and look them up: a GPU, or the reference on the CPU.
 
+use crate::detail::Detail;
 use crate::error::{About, Error, Field};
 use crate::executors::{Executors, GPU, REFERENCE, runs_on_gpu};
 use crate::receivers::Receivers;
@@ -20,14 +21,20 @@ pub struct RenderScene<'a> {
 
 impl<'a> RenderScene<'a> {
     /// Prepares the scene. If `opaque` is true, alpha masks are ignored, so that masked materials
-    /// show and cast as solid.
+    /// show and cast as solid. `detail` is what a GPU draws of it.
     ///
     /// # Errors
     /// An error if the scene refers to something that it does not contain, or if a GPU cannot hold
     /// it.
-    pub fn new(scene: &'a Scene, executors: &'a Executors, opaque: bool) -> Result<Self, Error> {
+    pub fn new(
+        scene: &'a Scene,
+        executors: &'a Executors,
+        opaque: bool,
+        detail: &Detail,
+    ) -> Result<Self, Error> {
         let tracer = Tracer::new(scene)?.opaque(opaque);
-        let buffers = |gpu| SceneBuffers::new(gpu, scene, opaque).on_gpu();
+        let clusters = detail.clusters();
+        let buffers = |gpu| SceneBuffers::with_clusters(gpu, scene, opaque, clusters).on_gpu();
         let gpu = executors.gpu().map(|gpu| buffers(gpu).map(|b| (gpu, b))).transpose()?;
         Ok(Self { tracer, gpu })
     }

@@ -27,7 +27,7 @@
 //! ```
 //! use std::path::Path;
 //! use umbrage_lab::{
-//!     Backend, Comparison, ComparisonOptions, Executors, Fit, LightOptions, PreparedScene,
+//!     Backend, Comparison, ComparisonOptions, Detail, Executors, Fit, LightOptions, PreparedScene,
 //!     SceneOptions, ViewOptions, open_scene,
 //! };
 //!
@@ -39,7 +39,7 @@
 //! let view = ViewOptions { size: [48, 27], ..ViewOptions::default() };
 //! let scene = open_scene(Path::new(""), "pole", &SceneOptions::default())?;
 //! let executors = Executors::open(Backend::Reference, &options.techniques)?;
-//! let prepared = PreparedScene::new(&scene, &executors, false, Fit::Surfaces)?;
+//! let prepared = PreparedScene::new(&scene, &executors, false, Fit::Surfaces, &Detail::FULL)?;
 //! let comparison = Comparison::new(&prepared, &view, &LightOptions::default(), &options)?;
 //! let folder = tempfile::tempdir()?;
 //! // `()` ignores the progress.
@@ -53,6 +53,7 @@ mod bencher;
 mod casters;
 mod comparison;
 mod defaults;
+mod detail;
 mod error;
 mod executor;
 mod executors;
@@ -77,6 +78,7 @@ pub use bencher::{Bencher, Costs};
 pub use casters::{MapCasters, casters, casters_culled};
 pub use comparison::{Compared, Comparison, ComparisonOptions};
 pub use defaults::Defaults;
+pub use detail::{Detail, DetailOptions};
 pub use error::{Difference, Error, Field, joined};
 pub use executor::{Executor, RenderScene, Scout, edge_on, shadow_options};
 pub use executors::{Backend, Executors, runs_on_gpu};

@@ -1,6 +1,7 @@
 //! A scene that is ready for comparisons.
 
 use crate::defaults::Defaults;
+use crate::detail::Detail;
 use crate::error::Error;
 use crate::executor::RenderScene;
 use crate::executors::Executors;
@@ -19,7 +20,7 @@ pub struct PreparedScene<'a> {
 
 impl<'a> PreparedScene<'a> {
     /// Prepares the scene. If `opaque` is true, alpha masks are ignored, so that masked materials
-    /// show and cast as solid.
+    /// show and cast as solid. `detail` is what a GPU draws of it.
     ///
     /// # Errors
     /// An error if the scene refers to something that it does not contain, or if a GPU cannot hold
@@ -29,8 +30,9 @@ impl<'a> PreparedScene<'a> {
         executors: &'a Executors,
         opaque: bool,
         fit: Fit,
+        detail: &Detail,
     ) -> Result<Self, Error> {
-        let render = RenderScene::new(scene, executors, opaque)?;
+        let render = RenderScene::new(scene, executors, opaque, detail)?;
         let receivers = Receivers::new(scene, render.tracer(), fit);
         let defaults = Defaults::of(Some(scene));
         Ok(Self { scene, executors, render, receivers, defaults, opaque })

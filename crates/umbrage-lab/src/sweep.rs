@@ -5,6 +5,7 @@ mod merge;
 mod views;
 
 use crate::comparison::{Comparison, ComparisonOptions};
+use crate::detail::{Detail, DetailOptions};
 use crate::error::{Error, Field};
 use crate::executors::{Backend, Executors};
 use crate::folder::ReportFolder;
@@ -39,6 +40,8 @@ pub struct SweepOptions {
     pub fit: Fit,
     /// The backend that renders the shadow maps.
     pub backend: Backend,
+    /// How much of the scenes a GPU draws.
+    pub detail: DetailOptions,
     /// Whether alpha masks are ignored, so that masked materials show and cast as solid.
     pub opaque: bool,
     /// How the scenes are changed.
@@ -144,6 +147,7 @@ fn begin(options: &SweepOptions) -> Result<Begun, Error> {
         samples: comparison.samples,
         light_size: comparison.light_size.map(|size| size.to_string()),
         opaque: options.opaque,
+        full_detail: options.detail == DetailOptions::Full,
         animation: options.scene.animation.clone(),
         time_s: options.scene.animation.as_ref().map(|_| options.scene.time_s),
         without: options.scene.without.clone(),
@@ -239,7 +243,8 @@ fn compare_missing(
             progress.scene(name, scene);
         }
         let prepared = scene.as_ref().map_err(Clone::clone).and_then(|scene| {
-            PreparedScene::new(scene, executors, options.opaque, options.fit).map_err(told)
+            let detail = Detail::new(scene, executors, &options.detail, progress).map_err(told)?;
+            PreparedScene::new(scene, executors, options.opaque, options.fit, &detail).map_err(told)
         });
         for view in pending {
             number += 1;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use umbrage_lab::{
-    Backend, Comparison, ComparisonOptions, Executors, Fit, LightOptions, Motion, PreparedScene,
-    Progress, SceneOptions, SweepOptions, ViewOptions, open_scene, sweep,
+    Backend, Comparison, ComparisonOptions, Detail, DetailOptions, Executors, Fit, LightOptions,
+    Motion, PreparedScene, Progress, SceneOptions, SweepOptions, ViewOptions, open_scene, sweep,
 };
 
 /// Remembers what it is told.
@@ -49,7 +49,7 @@ fn every_row_that_is_announced_is_told() {
     let options = options();
     let scene = open_scene(Path::new(""), "pole", &SceneOptions::default()).unwrap();
     let executors = Executors::open(Backend::Reference, &options.techniques).unwrap();
-    let prepared = PreparedScene::new(&scene, &executors, false, Fit::Box).unwrap();
+    let prepared = PreparedScene::new(&scene, &executors, false, Fit::Box, &Detail::FULL).unwrap();
     let view = ViewOptions { size: [32, 18], ..ViewOptions::default() };
     let comparison = Comparison::new(&prepared, &view, &LightOptions::default(), &options).unwrap();
     let memory = Memory::default();
@@ -78,6 +78,7 @@ fn a_sweep_names_its_parts_and_what_failed() {
         max_error: None,
         fit: Fit::Box,
         backend: Backend::Reference,
+        detail: DetailOptions::default(),
         opaque: false,
         scene: SceneOptions::default(),
         size: [32, 18],

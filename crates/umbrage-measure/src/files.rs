@@ -5,7 +5,8 @@ use crate::{Error, Image, Rgb};
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image as ExrImage, WritableImage};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use std::io::{Cursor, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Cursor, Write};
 use std::path::Path;
 
 /// Writes `bytes` to a file that is never seen incomplete: they go to a temporary file in the same
@@ -15,11 +16,26 @@ use std::path::Path;
 /// # Errors
 /// The folder does not exist or cannot be written to. No temporary file is left behind then.
 pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
-    let path = path.as_ref();
+    write_file_with(path.as_ref(), |file| file.write_all(bytes))
+}
+
+/// As [`write_file`], for files that need not be in memory as a whole: `write` writes one.
+///
+/// # Errors
+/// As [`write_file`], and those of `write`.
+pub fn write_file_with(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<(), Error> {
+    let buffered = |file: &mut File| {
+        let mut file = BufWriter::new(file);
+        write(&mut file)?;
+        file.flush()
+    };
     let is_device = std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir());
     let written = match is_device {
-        true => std::fs::write(path, bytes),
-        false => write_whole(path, |file| file.write_all(bytes)),
+        true => File::options().write(true).open(path).and_then(|mut file| buffered(&mut file)),
+        false => write_whole(path, buffered),
     };
     written.map_err(|source| Error::Write { path: path.to_owned(), source })
 }

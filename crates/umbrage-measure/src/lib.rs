@@ -31,7 +31,7 @@ mod verdict;
 
 pub use color::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS};
 pub use error::Error;
-pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_png};
+pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_file_with, write_png};
 pub use image::{Image, Rgb};
 pub use legend::with_legend;
 pub use maps::{difference_map, error_map, grey, noise_map, partition_map, texel_map};

@@ -35,6 +35,9 @@ pub struct SweepSettings {
     pub light_size: Option<String>,
     /// Whether alpha-masked materials cast and show as solid.
     pub opaque: bool,
+    /// Whether a GPU drew all triangles of all scenes.
+    #[serde(default)]
+    pub full_detail: bool,
     /// The animation that poses the scenes; `None` if they have the poses of their files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub animation: Option<String>,
@@ -398,6 +401,7 @@ pub(crate) mod tests {
                 samples: 4,
                 light_size: None,
                 opaque: true,
+                full_detail: false,
                 animation: None,
                 time_s: None,
                 without: Vec::new(),

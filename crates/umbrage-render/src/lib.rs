@@ -9,6 +9,7 @@
 //!   into.
 //! - [`Timer`] measures what the stages of frames take.
 
+mod clusters;
 mod error;
 mod frame_target;
 mod gpu;

@@ -1,3 +1,4 @@
+use crate::clusters::{ClusterDrawing, FRAME_SHARE_PX, picture_view};
 use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::map_picture::MapPicture;
@@ -12,8 +13,8 @@ use std::collections::HashMap;
 use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
-    CasterInstance, Casters, DEPTH_FORMAT, DepthProjection, Frame, Mask, MeshCasters, MeshKind,
-    SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
+    Bias, CasterInstance, Casters, ClusterCasters, DEPTH_FORMAT, DepthProjection, Frame, Mask,
+    MeshCasters, MeshKind, SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
@@ -48,6 +49,10 @@ pub struct Renderer<'g> {
     /// Pipelines by the names of their fragment shaders, made at first use.
     pictures: HashMap<&'static str, Pipelines>,
     instances: Instances,
+    /// Draws clusters, if the scene has any and their levels of detail are wanted.
+    clusters: Option<ClusterDrawing>,
+    /// Whether each choice of clusters is waited for.
+    is_exact: bool,
     edge_on: Vec<EdgeOn>,
     /// Origin of the render space in which the maps are looked up, world space, metres; `None`
     /// before maps are drawn.
@@ -125,7 +130,10 @@ impl<'g> Renderer<'g> {
         change: impl FnOnce(String) -> String,
     ) -> Result<Self, Error> {
         let device = gpu.device();
-        let shadows = Shadows::new(device, support, options)?;
+        let mut shadows = Shadows::new(device, support, options)?;
+        if scene.clusters.is_some() && support.clusters {
+            shadows.set_bias(ClusterCasters::bias(ClusterCasters::SHARE))?;
+        }
         let [positions, instances] = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
         let opaque = MeshCasters::new(
             device,
@@ -158,17 +166,19 @@ impl<'g> Renderer<'g> {
         let view_buffer = uniform_buffer::<ViewUniform>(device, "view");
         let overlay_buffer = uniform_buffer::<OverlayUniform>(device, "overlay");
         let (view_layout, view_group) = view_bindings(device, &view_buffer, &overlay_buffer);
+        let lookup = change(shadows.lookup_wgsl(1));
         let shader = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("forward"),
-            source: ShaderSource::Wgsl(shader_text(&change(shadows.lookup_wgsl(1))).into()),
+            source: ShaderSource::Wgsl(shader_text(&lookup).into()),
         });
+        let layouts = [&view_layout, shadows.lookup_layout(), &scene.material_layout];
+        let of_clusters = scene.clusters.as_ref().filter(|_| support.clusters);
+        let clusters = of_clusters
+            .map(|clusters| ClusterDrawing::new(gpu, clusters, &shadows, &lookup, layouts))
+            .transpose()?;
         let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("forward"),
-            bind_group_layouts: &[
-                Some(&view_layout),
-                Some(shadows.lookup_layout()),
-                Some(&scene.material_layout),
-            ],
+            bind_group_layouts: &layouts.map(Some),
             immediate_size: 0,
         });
         gpu.check()?;
@@ -188,6 +198,8 @@ impl<'g> Renderer<'g> {
             layout,
             pictures: HashMap::new(),
             instances: Instances::new(gpu),
+            clusters,
+            is_exact: true,
             edge_on: Vec::new(),
             eye: None,
         })
@@ -196,6 +208,26 @@ impl<'g> Renderer<'g> {
     /// The shadow maps, as `umbrage_wgpu` holds them.
     pub fn shadows(&self) -> &Shadows {
         &self.shadows
+    }
+
+    /// Draws all of the scene's triangles from now on, even if it was uploaded as clusters.
+    ///
+    /// # Errors
+    /// The device refused something.
+    pub fn draw_full_detail(&mut self) -> Result<(), Error> {
+        self.clusters = None;
+        Ok(self.shadows.set_bias(Bias::default())?)
+    }
+
+    /// Whether clusters are chosen and drawn.
+    pub fn draws_clusters(&self) -> bool {
+        self.clusters.is_some()
+    }
+
+    /// Does not wait for choices of clusters from now on, as befits frames that follow one another:
+    /// where one finds more than there is room for, something is missing until the next frame.
+    pub fn run_ahead(&mut self) {
+        self.is_exact = false;
     }
 
     /// Leaves these triangles out of the maps of their lights from now on. Those of one instance
@@ -232,6 +264,9 @@ impl<'g> Renderer<'g> {
         casters: Casters<'_>,
         timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
+        if self.clusters.is_some() && self.edge_on.is_empty() {
+            return self.draw_clusters(eye, plan, casters, timer);
+        }
         let Self { gpu, scene, shadows, instances, opaque, masked, masks, edge_on, .. } = self;
         let is_prefiltered = shadows.options().filter.prefilter().is_some();
         let frame = Frame { plan, render_origin: eye, casters };
@@ -280,6 +315,75 @@ impl<'g> Renderer<'g> {
         Ok(drawn)
     }
 
+    /// Draws the maps of a plan from the scene's clusters.
+    fn draw_clusters(
+        &mut self,
+        eye: DVec3,
+        plan: &Plan,
+        mut casters: Casters<'_>,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<Vec<(usize, Drawn)>, Error> {
+        let Self { gpu, scene, shadows, masks, clusters, is_exact, .. } = self;
+        let (Some(own), Some(drawing)) = (&scene.clusters, clusters) else {
+            return Ok(Vec::new());
+        };
+        let is_prefiltered = shadows.options().filter.prefilter().is_some();
+        let (device, queue) = (gpu.device(), gpu.queue());
+        if drawing.casters.counts(device).is_some_and(|counts| !counts.is_complete) {
+            drawing.is_complete = false;
+        }
+        loop {
+            if !std::mem::replace(&mut drawing.is_complete, true) {
+                casters = Casters::Moved;
+            }
+            let frame = Frame { plan, render_origin: eye, casters };
+            let prepared = shadows.prepare(device, queue, &frame)?;
+            self.eye = Some(eye);
+            let mut drawn: Vec<(usize, Drawn)> = Vec::new();
+            if prepared.stale().next().is_none() {
+                return Ok(drawn);
+            }
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
+            let choice = begin(Stage::Depth);
+            let depth = begin(Stage::Depth);
+            let filter = if is_prefiltered { begin(Stage::Filter) } else { None };
+            let timestamps = Timestamps { depth: writes(&depth), filter: writes(&filter) };
+            let casters = &mut drawing.casters;
+            let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
+            casters.choose(device, queue, &mut encoder, &own.geometry, &prepared, times)?;
+            prepared.encode(&mut encoder, &timestamps, |map| {
+                let index = map.redraw.index;
+                if drawn.last().is_none_or(|&(last, _)| last != index) {
+                    drawn.push((index, Drawn::default()));
+                }
+                let Some((_, into_map)) = drawn.last_mut() else { return };
+                into_map.draws += casters.draw(map, |batch| {
+                    let material = batch.checked_sub(1).map(|i| own.masked[i as usize]);
+                    material.and_then(|m| masks[m].as_ref())
+                });
+            });
+            if let Some(timer) = timer.as_deref_mut() {
+                timer.end(&mut encoder, choice.into_iter().chain(depth).chain(filter));
+            }
+            queue.submit([encoder.finish()]);
+            gpu.check()?;
+            if *is_exact {
+                gpu.wait()?;
+            }
+            let counts = drawing.casters.counts(device);
+            if *is_exact && counts.is_some_and(|counts| !counts.is_complete) {
+                drawing.is_complete = false;
+                continue;
+            }
+            // All maps are chosen for at once.
+            if let (Some(counts), Some((_, first))) = (counts, drawn.first_mut()) {
+                first.triangles = counts.triangles;
+            }
+            return Ok(drawn);
+        }
+    }
+
     /// Draws a frame to display into a target of the size of the camera's picture, without waiting
     /// for the device. The maps must have been drawn.
     ///
@@ -300,19 +404,25 @@ impl<'g> Renderer<'g> {
         name: &'static str,
         shading: &Shading<'_>,
         target: &FrameTarget,
-        timer: Option<&mut Timer>,
+        mut timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
         let tile = Tile::whole(shading.camera);
         let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
-        let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
         let color = &[&target.color_view][..];
         let (depth, depth_store) = (&target.depth, StoreOp::Store);
-        let parts = Target { color, depth, depth_store, pipelines: &pipelines };
-        let drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
-        target.encode_copy(&mut encoder);
-        self.gpu.queue().submit([encoder.finish()]);
-        self.gpu.check()?;
-        Ok(drawn)
+        let share_px = FRAME_SHARE_PX;
+        let parts = Target { color, depth, depth_store, share_px, pipelines: &pipelines };
+        loop {
+            let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
+            let timer = timer.as_deref_mut();
+            let mut drawn = self.encode_picture(&mut encoder, shading, &tile, &parts, timer)?;
+            target.encode_copy(&mut encoder);
+            self.gpu.queue().submit([encoder.finish()]);
+            self.gpu.check()?;
+            if self.is_whole(&mut drawn)? {
+                return Ok(drawn);
+            }
+        }
     }
 
     /// Reduces the depths of the frame that was drawn last into a target, and waits for what it
@@ -342,9 +452,15 @@ impl<'g> Renderer<'g> {
 
     /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
     pub(crate) fn pipelines(&mut self, name: &'static str, formats: &[TextureFormat]) -> Pipelines {
-        let Self { gpu, scene, shader, layout, pictures, .. } = self;
-        let attributes = &scene.attribute_layout;
-        let made = || pipelines(gpu, shader, layout, name, formats, attributes);
+        let Self { gpu, scene, shader, layout, pictures, clusters, .. } = self;
+        if let Some(clusters) = clusters {
+            return clusters.pipelines(gpu, name, formats);
+        }
+        let attributes = scene.attribute_layout.clone();
+        let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(attributes)];
+        let parts =
+            PipelineParts { gpu, module: shader, layout, vertex: "mesh_vertex", buffers: &buffers };
+        let made = || parts.pipelines(name, formats, CompareFunction::Greater);
         pictures.entry(name).or_insert_with(made).clone()
     }
 
@@ -358,7 +474,7 @@ impl<'g> Renderer<'g> {
         target: &Target<'_>,
         timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
-        let Self { gpu, scene, instances, .. } = self;
+        let Self { gpu, scene, instances, clusters, .. } = self;
         let Shading { camera, light, light_index } = *shading;
         debug_assert!(
             self.eye.is_none_or(|eye| eye == camera.eye()),
@@ -369,21 +485,59 @@ impl<'g> Renderer<'g> {
         let view = ViewUniform::new(camera, light, light_index, tile, scene.farthest(camera));
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
         let planes = tile.planes(camera);
-        instances.begin(scene, camera.eye());
-        let list = instances.add_nearest_first(scene, camera.eye(), |aabb| {
-            planes.iter().all(|p| p.may_touch(aabb))
-        });
-        instances.upload(gpu)?;
-        let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
         let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+        let mut queries = vec![];
+        let mut list = 0..0;
+        if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
+            let choice = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+            let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
+            let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
+            let (device, queue) = (gpu.device(), gpu.queue());
+            let ClusterDrawing { picture, depths, .. } = drawing;
+            let (geometry, eye) = (&own.geometry, camera.eye());
+            picture.encode(device, queue, encoder, geometry, &[view], eye, own.opaque, times)?;
+            let ahead = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                label: Some("depths"),
+                color_attachments: &[],
+                depth_stencil_attachment: Some(depth_attachment(
+                    target.depth,
+                    LoadOp::Clear(0.0),
+                    StoreOp::Store,
+                )),
+                timestamp_writes: writes(&ahead),
+                occlusion_query_set: None,
+                multiview_mask: None,
+            });
+            pass.set_pipeline(depths);
+            pass.set_bind_group(0, &self.view_group, &[]);
+            pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
+            if let Some(any) = scene.materials.first() {
+                pass.set_bind_group(2, &any.bind_group, &[]);
+            }
+            if let Some(group) = picture.vertex_group() {
+                pass.set_bind_group(3, group, &[]);
+                picture.draw_together(&mut pass, 0);
+            }
+            drop(pass);
+            queries.extend(choice.into_iter().chain(ahead));
+        } else {
+            instances.begin(scene, camera.eye());
+            list = instances.add_nearest_first(scene, camera.eye(), |aabb| {
+                planes.iter().all(|p| p.may_touch(aabb))
+            });
+            instances.upload(gpu)?;
+        }
+        let attachments: Vec<_> = target.color.iter().map(|view| color_attachment(view)).collect();
+        let load = if clusters.is_some() { LoadOp::Load } else { LoadOp::Clear(0.0) };
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &attachments,
-            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
-                view: target.depth,
-                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: target.depth_store }),
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment: Some(depth_attachment(
+                target.depth,
+                load,
+                target.depth_store,
+            )),
             timestamp_writes: writes(&query),
             occlusion_query_set: None,
             multiview_mask: None,
@@ -392,12 +546,27 @@ impl<'g> Renderer<'g> {
         pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
         let mut drawn = Drawn::default();
         let Pipelines { opaque, masked, sky } = target.pipelines;
-        let mut drawer = Drawer::new(scene, instances, &mut pass, &mut drawn);
-        for draw in instances.draws(list) {
-            let is_masked = scene.is_masked(draw.mesh);
-            drawer.choose(is_masked, if is_masked { masked } else { opaque });
-            drawer.bind(2, draw.mesh, |material| Some(&scene.materials[material].bind_group));
-            drawer.draw(draw);
+        if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
+            let picture = &drawing.picture;
+            if let Some(group) = picture.vertex_group() {
+                pass.set_bind_group(3, group, &[]);
+            }
+            for (batch, &material) in (0..).zip(&own.materials) {
+                if batch == 0 || batch == own.opaque {
+                    pass.set_pipeline(if batch < own.opaque { opaque } else { masked });
+                }
+                pass.set_bind_group(2, &scene.materials[material].bind_group, &[]);
+                picture.draw(&mut pass, batch);
+                drawn.draws += 1;
+            }
+        } else {
+            let mut drawer = Drawer::new(scene, instances, &mut pass, &mut drawn);
+            for draw in instances.draws(list) {
+                let is_masked = scene.is_masked(draw.mesh);
+                drawer.choose(is_masked, if is_masked { masked } else { opaque });
+                drawer.bind(2, draw.mesh, |material| Some(&scene.materials[material].bind_group));
+                drawer.draw(draw);
+            }
         }
         pass.set_pipeline(sky);
         if let Some(any) = scene.materials.first() {
@@ -406,9 +575,21 @@ impl<'g> Renderer<'g> {
         }
         drop(pass);
         if let Some(timer) = timer {
-            timer.end(encoder, query);
+            timer.end(encoder, query.into_iter().chain(queries));
         }
         Ok(drawn)
+    }
+
+    /// Whether the picture that was submitted last shows all that it should. If it does not, there
+    /// is more room now, and it must be drawn again.
+    pub(crate) fn is_whole(&mut self, drawn: &mut Drawn) -> Result<bool, Error> {
+        let Some(drawing) = &mut self.clusters else { return Ok(true) };
+        if self.is_exact {
+            self.gpu.wait()?;
+        }
+        let counts = drawing.picture.counts(self.gpu.device());
+        drawn.triangles = counts.triangles;
+        Ok(counts.is_complete || !drawing.picture.is_counted() || !self.is_exact)
     }
 }
 
@@ -458,6 +639,8 @@ pub(crate) struct Target<'a> {
     pub(crate) depth: &'a TextureView,
     /// Whether depths are kept for later passes.
     pub(crate) depth_store: StoreOp,
+    /// How far clusters may be off, pixels.
+    pub(crate) share_px: f32,
     pub(crate) pipelines: &'a Pipelines,
 }
 
@@ -532,24 +715,57 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 }
 
 /// The forward shader, after the lookup module that it calls.
-fn shader_text(lookup: &str) -> String {
+pub(crate) fn shader_text(lookup: &str) -> String {
     [lookup, include_str!("wgsl/forward.wgsl"), include_str!("wgsl/overlay.wgsl")].join("\n")
 }
 
-fn pipelines(
-    gpu: &Gpu,
-    module: &ShaderModule,
-    layout: &PipelineLayout,
-    name: &str,
-    formats: &[TextureFormat],
-    attributes: &VertexBufferLayout<'static>,
-) -> Pipelines {
-    let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
-    let buffers = [Some(POSITIONS), Some(CasterInstance::LAYOUT), Some(attributes.clone())];
-    let pipeline = |vertex, what: &str, buffers: &[Option<VertexBufferLayout<'_>>], compare| {
-        let fragment = format!("{what}_{name}");
+/// What pipelines of pictures have in common.
+pub(crate) struct PipelineParts<'a> {
+    pub(crate) gpu: &'a Gpu,
+    pub(crate) module: &'a ShaderModule,
+    pub(crate) layout: &'a PipelineLayout,
+    /// The vertex stage of meshes, and its buffers.
+    pub(crate) vertex: &'static str,
+    pub(crate) buffers: &'a [Option<VertexBufferLayout<'a>>],
+}
+
+impl PipelineParts<'_> {
+    /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
+    /// Fragments of meshes without holes are shaded where their depth compares so. Depth is
+    /// reversed.
+    pub(crate) fn pipelines(
+        &self,
+        name: &str,
+        formats: &[TextureFormat],
+        compare: CompareFunction,
+    ) -> Pipelines {
+        let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
+        let pipeline = |vertex, what: &str, buffers, compare| {
+            let fragment = format!("{what}_{name}");
+            self.pipeline(vertex, Some((&fragment, &targets)), buffers, compare)
+        };
+        Pipelines {
+            opaque: pipeline(self.vertex, "opaque", self.buffers, compare),
+            masked: pipeline(self.vertex, "masked", self.buffers, CompareFunction::Greater),
+            sky: pipeline("sky_vertex", "sky", &[], CompareFunction::GreaterEqual),
+        }
+    }
+
+    /// A pipeline that draws depths alone, by this vertex stage.
+    pub(crate) fn depths(&self, vertex: &str) -> RenderPipeline {
+        self.pipeline(vertex, None, &[], CompareFunction::Greater)
+    }
+
+    fn pipeline(
+        &self,
+        vertex: &str,
+        fragment: Option<(&str, &[Option<ColorTargetState>])>,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+        compare: CompareFunction,
+    ) -> RenderPipeline {
+        let Self { gpu, module, layout, .. } = self;
         gpu.device().create_render_pipeline(&RenderPipelineDescriptor {
-            label: Some(&fragment),
+            label: Some(fragment.map_or(vertex, |(name, _)| name)),
             layout: Some(layout),
             vertex: VertexState {
                 module,
@@ -567,26 +783,29 @@ fn pipelines(
                 bias: wgpu::DepthBiasState::default(),
             }),
             multisample: wgpu::MultisampleState::default(),
-            fragment: Some(FragmentState {
+            fragment: fragment.map(|(name, targets)| FragmentState {
                 module,
-                entry_point: Some(&fragment),
+                entry_point: Some(name),
                 compilation_options: PipelineCompilationOptions::default(),
-                targets: &targets,
+                targets,
             }),
             multiview_mask: None,
             cache: None,
         })
-    };
-    // Depth is reversed.
-    Pipelines {
-        opaque: pipeline("mesh_vertex", "opaque", &buffers, CompareFunction::Greater),
-        masked: pipeline("mesh_vertex", "masked", &buffers, CompareFunction::Greater),
-        sky: pipeline("sky_vertex", "sky", &[], CompareFunction::GreaterEqual),
     }
 }
 
 fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {
     query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes)
+}
+
+fn depth_attachment(
+    view: &TextureView,
+    load: LoadOp<f32>,
+    store: StoreOp,
+) -> RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(Operations { load, store });
+    RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
 pub(crate) fn color_attachment(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {

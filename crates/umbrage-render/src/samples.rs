@@ -1,6 +1,7 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
-use crate::renderer::{Pipelines, Renderer, Shading, Target};
+use crate::clusters::SAMPLE_SHARE_PX;
+use crate::renderer::{Drawn, Pipelines, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
 use glam::{Vec2, Vec3, Vec4};
@@ -151,19 +152,25 @@ impl Layers {
         // A tile at the edge of the picture is drawn into a corner of the textures.
         let device = renderer.gpu.device();
         let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let depth_store = StoreOp::Discard;
-        let target =
-            Target { color: &[&first, &second], depth: &depth, depth_store, pipelines: picture };
-        renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-        self.copy(&mut encoder, 0, 0);
-        self.copy(&mut encoder, 1, 1);
-        if let Some(texels) = texels {
-            let target = Target { color: &[&first], depth: &depth, depth_store, pipelines: texels };
+        let (depth_store, share_px) = (StoreOp::Discard, SAMPLE_SHARE_PX);
+        loop {
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let (color, pipelines) = (&[&first, &second][..], picture);
+            let target = Target { color, depth: &depth, depth_store, share_px, pipelines };
             renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-            self.copy(&mut encoder, 0, 2);
+            self.copy(&mut encoder, 0, 0);
+            self.copy(&mut encoder, 1, 1);
+            if let Some(pipelines) = texels {
+                let target =
+                    Target { color: &[&first], depth: &depth, depth_store, share_px, pipelines };
+                renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
+                self.copy(&mut encoder, 0, 2);
+            }
+            renderer.gpu.queue().submit([encoder.finish()]);
+            if renderer.is_whole(&mut Drawn::default())? {
+                break;
+            }
         }
-        renderer.gpu.queue().submit([encoder.finish()]);
         let data: Vec<Vec4> = renderer.gpu.read(&self.readback)?;
         let layer = self.bytes as usize / size_of::<Vec4>();
         let row = self.bytes_per_row as usize / size_of::<Vec4>();

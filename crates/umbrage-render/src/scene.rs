@@ -1,9 +1,11 @@
+use crate::clusters::SceneClusters;
 use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use umbrage::{Aabb, Camera};
+use umbrage_clusters::ClusterMesh;
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Moved, Role, Sampling, Scene, Texture, Wrap};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{
@@ -27,6 +29,8 @@ pub struct SceneBuffers {
     pub(crate) meshes: Vec<MeshRange>,
     pub(crate) materials: Vec<GpuMaterial>,
     pub(crate) material_layout: BindGroupLayout,
+    /// The scene as clusters, if it was uploaded with them.
+    pub(crate) clusters: Option<SceneClusters>,
     /// Renderers share the buffers, so that a new pose reaches all of them.
     placed: RwLock<Placed>,
 }
@@ -40,7 +44,7 @@ pub(crate) struct Placed {
     /// For each of the scene's instances, its index in `instances`, if it has triangles.
     drawable_of: Vec<Option<u32>>,
     /// A box around each mesh, in its own space, metres.
-    mesh_boxes: Vec<Aabb>,
+    pub(crate) mesh_boxes: Vec<Aabb>,
     /// A box around all instances that are seen, world space, metres.
     bounds: Aabb,
 }
@@ -92,25 +96,25 @@ pub(crate) struct GpuMask {
 /// The attributes of a vertex without its position, which has a buffer of its own because opaque
 /// casters need nothing else: normal and texture coordinates.
 const PLAIN: VertexBufferLayout<'static> = VertexBufferLayout {
-    array_stride: 5 * size_of::<f32>() as u64,
+    array_stride: 3 * size_of::<u32>() as u64,
     step_mode: VertexStepMode::Vertex,
     attributes: &[uv(VertexFormat::Float32x2), NORMAL],
 };
 
 /// The attributes of a vertex in scenes where masked vertices have an alpha of their own. It is the
-/// fourth number after the normal; the third is padding.
+/// fourth word after the normal; the third is padding.
 const WITH_ALPHA: VertexBufferLayout<'static> = VertexBufferLayout {
-    array_stride: 7 * size_of::<f32>() as u64,
+    array_stride: 5 * size_of::<u32>() as u64,
     attributes: &[uv(VertexFormat::Float32x4), NORMAL],
     ..PLAIN
 };
 
 const NORMAL: VertexAttribute =
-    VertexAttribute { format: VertexFormat::Float32x3, offset: 0, shader_location: 5 };
+    VertexAttribute { format: VertexFormat::Uint32, offset: 0, shader_location: 5 };
 
 /// Texture coordinates, with alpha if the format has four components.
 const fn uv(format: VertexFormat) -> VertexAttribute {
-    VertexAttribute { format, offset: size_of::<Vec3>() as u64, shader_location: 4 }
+    VertexAttribute { format, offset: size_of::<u32>() as u64, shader_location: 4 }
 }
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -127,6 +131,21 @@ impl SceneBuffers {
     /// # Errors
     /// The scene or a texture is too large for the device.
     pub fn new(gpu: &Gpu, scene: &Scene, opaque: bool) -> Result<Self, Error> {
+        Self::with_clusters(gpu, scene, opaque, None)
+    }
+
+    /// Uploads a scene and, if there are any, the clusters of its meshes, from which renderers then
+    /// choose what to draw. Such a scene stays in its pose. Where the device lacks what clusters
+    /// need, or room for them, they are left out: see [`has_clusters`](Self::has_clusters).
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new), or if the clusters are not those of the scene's meshes.
+    pub fn with_clusters(
+        gpu: &Gpu,
+        scene: &Scene,
+        opaque: bool,
+        clusters: Option<&[ClusterMesh]>,
+    ) -> Result<Self, Error> {
         let device = gpu.device();
         let limits = device.limits();
         let largest = limits.max_buffer_size.min(u64::from(u32::MAX));
@@ -134,7 +153,7 @@ impl SceneBuffers {
         let indices: usize = scene.meshes.iter().map(|m| 3 * m.triangles.len()).sum();
         let has_alpha = scene.meshes.iter().any(|m| !m.alphas.is_empty());
         let attribute_layout = if has_alpha { WITH_ALPHA } else { PLAIN };
-        let floats = attribute_layout.array_stride as usize / size_of::<f32>();
+        let floats = attribute_layout.array_stride as usize / size_of::<u32>();
         let bytes = (vertices as u64 * attribute_layout.array_stride).max(4 * indices as u64);
         if bytes > largest {
             return Err(Error::TooLarge {
@@ -177,24 +196,25 @@ impl SceneBuffers {
             range
         });
         let meshes: Vec<MeshRange> = meshes.collect();
-        let buffers = Self {
-            positions: gpu.buffer(
-                "positions",
-                bytemuck::cast_slice(&all_positions),
-                BufferUsages::VERTEX,
-            ),
-            attributes: gpu.buffer(
-                "attributes",
-                bytemuck::cast_slice(&attributes),
-                BufferUsages::VERTEX,
-            ),
+        let is_clustered = clusters.is_some() && gpu.support().clusters;
+        let vertex_usage = match is_clustered {
+            true => BufferUsages::VERTEX | BufferUsages::STORAGE,
+            false => BufferUsages::VERTEX,
+        };
+        let mut buffers = Self {
+            positions: gpu.buffer("positions", bytemuck::cast_slice(&all_positions), vertex_usage),
+            attributes: gpu.buffer("attributes", bytemuck::cast_slice(&attributes), vertex_usage),
             attribute_layout,
             indices: gpu.buffer("indices", bytemuck::cast_slice(&all_indices), BufferUsages::INDEX),
             meshes,
             materials: materials.list,
             material_layout,
             placed: RwLock::new(placed),
+            clusters: None,
         };
+        if let Some(clusters) = clusters.filter(|_| is_clustered) {
+            buffers.clusters = SceneClusters::new(gpu, scene, &buffers, clusters)?;
+        }
         gpu.check()?;
         Ok(buffers)
     }
@@ -207,8 +227,15 @@ impl SceneBuffers {
     /// on, and the boxes of several poses between two draws count together.
     ///
     /// # Errors
-    /// The scene is not the one that was uploaded, or the device refused something.
+    /// The scene is not the one that was uploaded, it was uploaded with clusters and something
+    /// moved, or the device refused something.
     pub fn pose(&self, gpu: &Gpu, scene: &Scene, moved: &Moved) -> Result<Vec<Aabb>, Error> {
+        if self.clusters.is_some() && !(moved.instances.is_empty() && moved.meshes.is_empty()) {
+            return Err(Error::Invalid {
+                field: "clusters",
+                problem: "must be none for scenes that move, but the scene has some".into(),
+            });
+        }
         let mut placed = self.placed.write().unwrap_or_else(PoisonError::into_inner);
         let is_same = scene.meshes.len() == self.meshes.len()
             && scene.instances.len() == placed.drawable_of.len()
@@ -257,9 +284,15 @@ impl SceneBuffers {
         self.materials[self.meshes[mesh].material].mask.is_some()
     }
 
-    /// Memory of vertices and indices, bytes.
+    /// Whether the scene was uploaded as clusters.
+    pub fn has_clusters(&self) -> bool {
+        self.clusters.is_some()
+    }
+
+    /// Memory of vertices, indices and clusters, bytes.
     pub fn bytes(&self) -> u64 {
-        self.positions.size() + self.attributes.size() + self.indices.size()
+        let clusters = self.clusters.as_ref().map_or(0, |c| c.geometry.bytes());
+        self.positions.size() + self.attributes.size() + self.indices.size() + clusters
     }
 }
 
@@ -321,7 +354,7 @@ impl Drawable {
 /// space's origin, but for meshes that lie far from it: those of a city in map coordinates, say.
 /// Single precision holds their positions, but not where the viewer is among these, and the sum of
 /// the two would be off by a good part of a metre.
-fn anchor(bounds: Aabb) -> DVec3 {
+pub(crate) fn anchor(bounds: Aabb) -> DVec3 {
     /// Largest distance from the origin, in sizes of the mesh, at which rounding does not matter.
     const FAR: f64 = 100.0;
     let distance = bounds.min.abs().max(bounds.max.abs()).max_element();
@@ -339,14 +372,33 @@ fn uploaded(mesh: &Mesh, bounds: Aabb) -> impl Iterator<Item = Vec3> {
 }
 
 /// Adds the attributes of a mesh's vertices, as [`PLAIN`] or [`WITH_ALPHA`] lays them out.
-fn push_attributes(mesh: &Mesh, has_alpha: bool, attributes: &mut Vec<f32>) {
+fn push_attributes(mesh: &Mesh, has_alpha: bool, attributes: &mut Vec<u32>) {
     for i in 0..mesh.positions.len() {
-        attributes.extend(mesh.normals.get(i).copied().unwrap_or(Vec3::ZERO).to_array());
-        attributes.extend(mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO).to_array());
+        attributes.push(packed(mesh.normals.get(i).copied().unwrap_or(Vec3::ZERO)));
+        let uv = mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO);
+        attributes.extend(uv.to_array().map(f32::to_bits));
         if has_alpha {
-            attributes.extend([0.0, mesh.alphas.get(i).copied().unwrap_or(1.0)]);
+            let alpha = mesh.alphas.get(i).copied().unwrap_or(1.0);
+            attributes.extend([0, alpha.to_bits()]);
         }
     }
+}
+
+/// Stands for a normal of length 0.
+const NO_NORMAL: u32 = 0x8000_8000;
+
+/// A normal as a point of an octahedron (Meyer et al. 2010), with 16 bits for each coordinate.
+/// `unpacked` in `wgsl/forward.wgsl` is the inverse.
+fn packed(normal: Vec3) -> u32 {
+    let sum = normal.abs().element_sum();
+    if !(sum > 0.0 && sum.is_finite()) {
+        return NO_NORMAL;
+    }
+    let n = normal / sum;
+    let folded = Vec2::new(1.0 - n.y.abs(), 1.0 - n.x.abs()) * n.truncate().signum();
+    let at = if n.z < 0.0 { folded } else { n.truncate() };
+    let [x, y] = at.to_array().map(|c| (c * 32_767.0).round() as i16 as u16);
+    u32::from(x) | u32::from(y) << 16
 }
 
 /// Collects the materials in the order in which meshes use them.

@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 use umbrage::{Aabb, Light};
-use umbrage_scene::{BuiltinInfo, Scene, SceneError, builtin, builtins, closed_form};
+use umbrage_scene::{BuiltinInfo, Mesh, Scene, SceneError, builtin, builtins, closed_form};
 
 fn small(info: &BuiltinInfo) -> u32 {
     info.default_size.div_ceil(8)
@@ -65,10 +65,80 @@ fn default_sizes_build_quickly_and_largest_reach_millions() {
         let scene = builtin(info.name, None).unwrap();
         assert!(scene.stored_triangles() <= 300_000, "{}: {}", info.name, scene.stored_triangles());
         assert!(scene.drawn_triangles() <= 1_000_000, "{}: {}", info.name, scene.drawn_triangles());
-        let [a, b] = [info.max_size / 8, info.max_size / 4]
+        // The largest colossus would take gigabytes, so its sizes are tried where they are small.
+        let last = info.max_size.min(if info.name == "colossus" { 8 } else { u32::MAX });
+        let [a, b] = [last / 4, last / 2]
             .map(|s| builtin(info.name, Some(s)).unwrap().drawn_triangles() as f64);
-        // Extrapolates the growth from one size to the next by two more steps.
-        assert!(b * (b / a).powi(2) > 4e6, "{}: {a} and {b} triangles", info.name);
+        // Extrapolates the growth from one size to the next.
+        let doublings = f64::from(info.max_size / (last / 2)).log2();
+        assert!(b * (b / a).powf(doublings) > 4e6, "{}: {a} and {b} triangles", info.name);
+    }
+}
+
+#[test]
+fn largest_sizes_draw_hundreds_of_millions() {
+    for name in ["town", "airfield", "statues", "grove"] {
+        let info = builtins().iter().find(|b| b.name == name).unwrap();
+        let scene = builtin(name, Some(info.max_size)).unwrap();
+        let drawn = scene.drawn_triangles();
+        assert!(drawn > 350_000_000, "{name}: {drawn}");
+        assert!(scene.stored_triangles() < 1_000_000, "{name}: {}", scene.stored_triangles());
+        assert!(scene.instances.len() < 1_000_000, "{name}: {}", scene.instances.len());
+        let bounds = scene.bounds();
+        assert!((bounds.max - bounds.min).max_element() < 1e5, "{name}: {bounds:?}");
+        assert_sound(&scene, name);
+    }
+}
+
+/// Sizes that were the largest once are what they were, so that measurements stay comparable.
+#[test]
+fn scenes_of_a_size_stay_as_they_are() {
+    for (name, size, drawn, instances) in [
+        ("town", 3000, 99_257_654, 79_010),
+        ("airfield", 4000, 35_435_300, 16_015),
+        ("statues", 40, 42_376_002, 3201),
+        ("grove", 4000, 43_360_626, 8495),
+    ] {
+        let scene = builtin(name, Some(size)).unwrap();
+        assert_eq!((scene.drawn_triangles(), scene.instances.len()), (drawn, instances), "{name}");
+    }
+}
+
+#[test]
+fn the_colossus_is_one_closed_mesh_that_nowhere_repeats_itself() {
+    for (size, quads) in [(1, 71), (2, 100)] {
+        let scene = builtin("colossus", Some(size)).unwrap();
+        let is_stone = |m: &&Mesh| scene.materials[m.material].name == "marble";
+        let stones: Vec<&Mesh> = scene.meshes.iter().filter(is_stone).collect();
+        assert_eq!(stones.len(), 1);
+        let stone = stones[0];
+        let triangles = 20 * quads * quads;
+        assert_eq!((stone.triangles.len(), stone.positions.len()), (triangles, triangles / 2 + 2));
+        // Each edge belongs to two triangles, which run along it in opposite directions.
+        let edges = stone.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let unique: HashSet<(u32, u32)> = edges.collect();
+        assert_eq!(unique.len(), 3 * triangles);
+        assert!(unique.iter().all(|&(a, b)| unique.contains(&(b, a))));
+        // No two triangles have the same shape.
+        let shapes: HashSet<[u32; 3]> = stone
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| stone.positions[i as usize]);
+                [a.distance(b), b.distance(c), c.distance(a)].map(f32::to_bits)
+            })
+            .collect();
+        assert_eq!(shapes.len(), triangles);
+        // It contains what its triangles surround, and not the other way round.
+        let volume: f64 = stone
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| stone.positions[i as usize].as_dvec3());
+                a.dot(b.cross(c)) / 6.0
+            })
+            .sum();
+        assert!((90.0..200.0).contains(&volume), "{volume} m³");
     }
 }
 

@@ -95,6 +95,80 @@ fn a_million_instances_load() {
     assert!(peak < 150 * MIB, "{peak} bytes");
 }
 
+/// Unlike instances out of nothing, these have data, and each is somewhere else.
+#[test]
+fn a_million_instances_with_data_load_and_have_bounds() {
+    let _alone = alone();
+    let n = 1_000_000;
+    let mut file = File::triangle();
+    let at: Vec<f32> = (0..n).flat_map(|k| [k as f32, 0.0, -(k as f32)]).collect();
+    let at = file.floats("VEC3", &at);
+    let rotation = file.floats("VEC4", &[0.0, 0.6, 0.0, 0.8].repeat(n));
+    let scale = file.floats("VEC3", &[2.0, 2.0, 2.0].repeat(n));
+    let attributes = json!({"TRANSLATION": at, "ROTATION": rotation, "SCALE": scale});
+    let file = file
+        .set("/nodes/0/extensions", json!({"EXT_mesh_gpu_instancing": {"attributes": attributes}}));
+    let (folder, encoded) = (TempDir::new().unwrap(), file.buffer.len() as u64);
+    let path = file.write(folder.path());
+    let begin = std::time::Instant::now();
+    let (peak, scene) = peak(|| umbrage_scene::load(&path).unwrap());
+    println!("{:?}, {} MiB", begin.elapsed(), peak / MIB);
+    assert_eq!(scene.instances.len(), n);
+    assert_eq!(scene.instances[n - 1].world_from_mesh.translation.x, 999_999.0);
+    assert!(scene.bounds().max.x > 999_999.0);
+    // The file, the same as floats, and the instances.
+    let instances = (n * size_of::<umbrage_scene::Instance>()) as u64;
+    assert!(peak < 2 * encoded + instances + 100 * MIB, "{peak} bytes");
+}
+
+/// Whatever size a small file declares, the size of what it has decides.
+#[test]
+fn buffers_of_gigabytes_in_tiny_files_are_refused_at_once() {
+    let _alone = alone();
+    let folder = TempDir::new().unwrap();
+    let refused = |path: &Path| {
+        let (peak, result) = peak(|| umbrage_scene::load(path));
+        assert!(peak < MIB, "{peak} bytes");
+        result.expect_err("declares more than it has").to_string()
+    };
+    let huge = 4u64 << 30;
+    // A buffer, and an accessor of it, beside the file.
+    let path = File::triangle().write(folder.path());
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    json["buffers"][0]["byteLength"] = json!(huge);
+    std::fs::write(&path, json.to_string()).unwrap();
+    assert!(refused(&path).contains("buffers[0]: is cut off: it should have 4294967296 bytes"));
+    let mut file = File::triangle();
+    let view = json!({"buffer": 0, "byteOffset": 0, "byteLength": huge});
+    let view = file.push("bufferViews", view);
+    file.json["accessors"][0]["bufferView"] = json!(view);
+    file.json["accessors"][0]["count"] = json!(huge / 12);
+    *file.primitive() = json!({"attributes": {"POSITION": 0}});
+    let said = refused(&file.write(folder.path()));
+    assert!(said.contains("bufferViews["), "{said}");
+    // The same in one binary file, whose header and whose chunk lie as well.
+    let path = folder.path().join("huge.glb");
+    let mut json = File::triangle().with_buffer(None, 0).json;
+    json["buffers"][0]["byteLength"] = json!(huge);
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    for (length, chunk) in [(None, 4), (Some(u32::MAX), u32::MAX - 3)] {
+        let mut glb = b"glTF\x02\0\0\0".to_vec();
+        glb.extend(length.unwrap_or(32 + text.len() as u32).to_le_bytes());
+        for (kind, len, bytes) in
+            [(b"JSON", text.len() as u32, &text[..]), (b"BIN\0", chunk, &[0; 4])]
+        {
+            glb.extend(len.to_le_bytes());
+            glb.extend(kind);
+            glb.extend(bytes);
+        }
+        std::fs::write(&path, &glb).unwrap();
+        let said = refused(&path);
+        assert!(said.contains("cut off") || said.contains("bytes"), "{said}");
+    }
+}
+
 #[test]
 fn meshes_that_share_data_count_each() {
     let _alone = alone();

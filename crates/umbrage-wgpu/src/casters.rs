@@ -91,16 +91,31 @@ impl MeshCasters {
         kind: MeshKind,
         buffers: &[Option<VertexBufferLayout<'_>>],
     ) -> Self {
+        let text = wgsl::mesh(shadows.support(), kind == MeshKind::Masked);
+        Self::of_text(device, shadows, kind, text, buffers, None)
+    }
+
+    /// Draws with the vertex stage of a text, whose own bind group, if it has one, follows those of
+    /// the map and the mask.
+    pub(crate) fn of_text(
+        device: &Device,
+        shadows: &Shadows,
+        kind: MeshKind,
+        text: String,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+        own: Option<&BindGroupLayout>,
+    ) -> Self {
         let is_masked = kind == MeshKind::Masked;
         let module = device.create_shader_module(ShaderModuleDescriptor {
             label: Some("shadow casters"),
-            source: ShaderSource::Wgsl(wgsl::mesh(shadows.support(), is_masked).into()),
+            source: ShaderSource::Wgsl(text.into()),
         });
         let mask_layout = is_masked.then(|| mask_layout(device));
-        let layouts = [Some(shadows.caster_layout()), mask_layout.as_ref()];
+        let layouts = [Some(shadows.caster_layout()), mask_layout.as_ref(), own];
+        let used = layouts.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
         let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("shadow casters"),
-            bind_group_layouts: &layouts[..1 + usize::from(is_masked)],
+            bind_group_layouts: &layouts[..used],
             immediate_size: 0,
         });
         let fragment = match (kind, shadows.caster_needs_fragment()) {

@@ -51,6 +51,12 @@ impl FourPlanes {
         four
     }
 
+    /// The half-spaces, but for those that are all of space.
+    pub(crate) fn planes(&self) -> impl Iterator<Item = Vec4> + '_ {
+        let plane = |i: usize| Vec3::from(self.normals.map(|n| n[i])).extend(self.offsets[i]);
+        (0..4).map(plane).filter(|plane| plane.truncate() != Vec3::ZERO)
+    }
+
     /// Whether any point of the box may lie inside all four half-spaces.
     pub(crate) fn may_touch(&self, aabb: &LocalBox) -> bool {
         let farthest = |axis: usize| {

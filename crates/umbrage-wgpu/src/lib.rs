@@ -60,6 +60,7 @@
 //! new [`Shadows`] on the new device.
 
 mod casters;
+mod clusters;
 // The recipes are compiled and run by the tests in `tests/gpu/cookbook.rs`.
 #[cfg(all(doc, not(doctest)))]
 pub mod cookbook;
@@ -76,6 +77,10 @@ mod support;
 mod wgsl;
 
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
+pub use clusters::{
+    AttributeLayout, ClusterCasters, ClusterCounts, ClusterGeometry, ClusterInstance,
+    ClusterSelection, ClusterSource, ClusterVertices, ClusterView,
+};
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};
 pub use redraw::Redraw;

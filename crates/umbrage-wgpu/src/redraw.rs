@@ -2,6 +2,7 @@
 
 use crate::culling::{FourPlanes, LocalBox};
 use crate::shadows::Record;
+use glam::Vec4;
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Place, Plane, ShadowMap};
 
@@ -60,6 +61,11 @@ impl<'a> Redraw<'a> {
         let local = LocalBox::new(aabb, self.shadow_map.origin);
         !local.is_empty()
             && self.beams.iter().chain(self.caster_planes).all(|planes| planes.may_touch(&local))
+    }
+
+    /// Half-spaces around all that casts into what is drawn, relative to the map's origin.
+    pub(crate) fn local_planes(&self) -> impl Iterator<Item = Vec4> + '_ {
+        self.beams.iter().chain(self.caster_planes).flat_map(FourPlanes::planes)
     }
 }
 

@@ -18,6 +18,9 @@ use wgpu::{
 ///   multiple of 6 are needed;
 /// - interpolation of 32-bit floats, 16-bit normalised or signed 8-bit textures, the prefilters
 ///   that store their statistics in such textures are [`Error::Unsupported`];
+/// - storage buffers in vertex shaders, indirect draws, or ten storage buffers in compute shaders,
+///   there are no [clusters](crate::ClusterGeometry) but [`MeshCasters`](crate::MeshCasters) alone,
+///   whose time grows with the number of triangles;
 /// - compute shaders, or fetching depths, [`SeenReadback`](crate::SeenReadback) is
 ///   [`Error::Unsupported`];
 /// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
@@ -34,6 +37,8 @@ pub struct Support {
     /// Whether there are compute shaders, with which [`SeenReadback`](crate::SeenReadback) reduces
     /// depths.
     pub compute: bool,
+    /// Whether shaders can choose clusters of triangles, and draw what they chose.
+    pub clusters: bool,
     /// Whether textures of 32-bit floats can be interpolated, as `vsm`, `esm` and `evsm` need.
     pub float32: bool,
     /// Whether 16-bit normalised textures can be drawn into and interpolated, as `msm` and the
@@ -60,6 +65,9 @@ pub struct Support {
 
 /// The number of storage buffers that lookup uses.
 const STORAGE_BUFFERS: u32 = 3;
+
+/// The number of storage buffers that the choice of clusters uses at once.
+const CLUSTER_BUFFERS: u32 = 10;
 
 impl Support {
     /// Features that make shadows faster or allow more filters. Request those that the adapter has
@@ -120,13 +128,20 @@ impl Support {
         }
         let storage_buffers = flags.contains(DownlevelFlags::FRAGMENT_STORAGE)
             && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS;
+        let compute = flags.contains(DownlevelFlags::COMPUTE_SHADERS)
+            && limits.max_compute_invocations_per_workgroup >= 64
+            && limits.max_storage_buffers_per_shader_stage >= 1;
+        let clusters = compute
+            && backend != Backend::Gl
+            && flags.contains(DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::INDIRECT_EXECUTION)
+            && limits.max_compute_invocations_per_workgroup >= 256
+            && limits.max_storage_buffers_per_shader_stage >= CLUSTER_BUFFERS;
         Ok(Self {
             depth_clip_control: features.contains(Features::DEPTH_CLIP_CONTROL),
             storage_buffers,
             depth_fetch,
-            compute: flags.contains(DownlevelFlags::COMPUTE_SHADERS)
-                && limits.max_compute_invocations_per_workgroup >= 64
-                && limits.max_storage_buffers_per_shader_stage >= 1,
+            compute,
+            clusters,
             float32: features.contains(Features::FLOAT32_FILTERABLE),
             norm16: features.contains(Features::TEXTURE_FORMAT_16BIT_NORM),
             // Drawing into this format is not guaranteed on every device; only an adapter can tell.
@@ -152,6 +167,7 @@ impl Support {
         storage_buffers: true,
         depth_fetch: true,
         compute: true,
+        clusters: true,
         float32: true,
         norm16: true,
         snorm8: true,

@@ -13,7 +13,7 @@
 
 mod generated;
 
-use crate::{Comparison, Layout, LookupBuffers, ShadowOptions, Support};
+use crate::{AttributeLayout, Comparison, Layout, LookupBuffers, ShadowOptions, Support};
 use generated::Axis;
 use std::borrow::Cow;
 use std::fmt::Debug;
@@ -410,8 +410,110 @@ fn mesh_shader(support: &Support, is_masked: bool) -> Shader {
     let root = if is_masked { module!("mesh_masked") } else { module!("mesh_opaque") };
     let mut shader = Shader::new(root);
     shader.add([module!("caster"), module!("mesh")]);
+    shader.add(is_masked.then(|| module!("mask")));
     add_caster_constants(&mut shader, 0, support);
     shader
+}
+
+/// The bind group in which shaders that draw clusters into maps have their bindings.
+const CLUSTER_GROUP: u32 = 2;
+
+/// The text of the shader of [`ClusterCasters`](crate::ClusterCasters), with the map in bind group
+/// 0, the mask in bind group 1 and the clusters in bind group 2.
+pub(crate) fn cluster_caster(
+    support: &Support,
+    layout: AttributeLayout,
+    is_masked: bool,
+) -> String {
+    cluster_caster_shader(support, layout, is_masked).link()
+}
+
+fn cluster_caster_shader(support: &Support, layout: AttributeLayout, is_masked: bool) -> Shader {
+    let root = if is_masked { module!("cluster_masked") } else { module!("cluster_opaque") };
+    let mut shader = Shader::new(root);
+    shader.add([module!("caster")]);
+    if is_masked {
+        shader.add([module!("mask")]);
+        add_cluster_uv(&mut shader, layout);
+    }
+    add_cluster_vertex(&mut shader, CLUSTER_GROUP, layout);
+    add_caster_constants(&mut shader, 0, support);
+    shader
+}
+
+/// The text for vertex stages that draw clusters, with its bindings in bind group `group`.
+pub(crate) fn cluster_vertex(group: u32, layout: AttributeLayout) -> String {
+    cluster_picture_shader(group, layout).link()
+}
+
+fn cluster_picture_shader(group: u32, layout: AttributeLayout) -> Shader {
+    let mut shader = Shader::new(module!("cluster_picture"));
+    add_cluster_vertex(&mut shader, group, layout);
+    add_cluster_uv(&mut shader, layout);
+    shader
+}
+
+fn cluster_vertex_shader(group: u32, layout: AttributeLayout) -> Shader {
+    let mut shader = Shader::new(module!("cluster_vertex"));
+    shader.add([module!("cluster_instance")]);
+    shader.constant("SHADOW_CLUSTER_BINDINGS", group);
+    shader.constant("SHADOW_CLUSTER_STRIDE", layout.stride);
+    shader
+}
+
+/// Adds the module that gives vertices their texture coordinates and alpha.
+fn add_cluster_uv(shader: &mut Shader, layout: AttributeLayout) {
+    let uv = layout.uv.map(|uv| (uv, layout.alpha));
+    if let Some((uv, alpha)) = uv {
+        shader.constant("SHADOW_CLUSTER_UV", uv);
+        if let Some(alpha) = alpha {
+            shader.constant("SHADOW_CLUSTER_ALPHA", alpha);
+        }
+    }
+    shader.add([match uv {
+        None => module!("cluster_uv/none"),
+        Some((_, None)) => module!("cluster_uv/plain"),
+        Some((_, Some(_))) => module!("cluster_uv/alpha"),
+    }]);
+}
+
+/// The text of the pass that chooses clusters.
+pub(crate) fn cluster_descent() -> String {
+    cluster_descent_shader().link()
+}
+
+fn cluster_descent_shader() -> Shader {
+    let mut shader = Shader::new(module!("cluster_descent"));
+    shader.add([module!("cluster_instance"), module!("cluster_types")]);
+    shader
+}
+
+/// The text of the pass that gives draws of clusters their ranges of the index buffer.
+pub(crate) fn cluster_draws() -> String {
+    cluster_draws_shader().link()
+}
+
+fn cluster_draws_shader() -> Shader {
+    let mut shader = Shader::new(module!("cluster_draws"));
+    shader.add([module!("cluster_types")]);
+    shader
+}
+
+/// The text of the pass that writes the index buffer of chosen clusters.
+pub(crate) fn cluster_indices() -> String {
+    cluster_indices_shader().link()
+}
+
+fn cluster_indices_shader() -> Shader {
+    let mut shader = Shader::new(module!("cluster_indices"));
+    shader.add([module!("cluster_types")]);
+    shader
+}
+
+fn add_cluster_vertex(shader: &mut Shader, group: u32, layout: AttributeLayout) {
+    let Shader { modules, constants } = cluster_vertex_shader(group, layout);
+    shader.add(modules);
+    shader.constants += &constants;
 }
 
 /// The text of the pass that reduces the viewer's depths to tiles.

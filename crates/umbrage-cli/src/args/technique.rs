@@ -3,8 +3,9 @@
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 use umbrage::visibility::LightSize;
-use umbrage_lab::{Backend, ComparisonOptions, NamedTechnique};
+use umbrage_lab::{Backend, ComparisonOptions, DetailOptions, NamedTechnique};
 
 /// What is compared if not told: the papers' maps, and what renderers ship beside its counterpart
 /// of this library.
@@ -107,6 +108,24 @@ pub(crate) struct ExecutionArgs {
     /// What renders the shadow maps.
     #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
     pub(crate) backend: BackendArg,
+    /// Draw all triangles. Else a GPU draws scenes of a million triangles or more in levels of
+    /// detail, of which texels and pixels can tell no more than half of their width.
+    #[arg(long)]
+    pub(crate) full_detail: bool,
+    /// Take the levels of detail from a file that `umbrage prepare` wrote of this scene.
+    #[arg(long, value_name = "FILE", conflicts_with = "full_detail")]
+    pub(crate) clusters: Option<PathBuf>,
+}
+
+impl ExecutionArgs {
+    /// How much detail a GPU draws.
+    pub(crate) fn detail(&self) -> DetailOptions {
+        match &self.clusters {
+            Some(file) => DetailOptions::File(file.clone()),
+            None if self.full_detail => DetailOptions::Full,
+            None => DetailOptions::Auto,
+        }
+    }
 }
 
 /// What renders shadow maps.

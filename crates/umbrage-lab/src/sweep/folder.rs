@@ -224,6 +224,7 @@ pub(super) fn check_same(
             (Field::LightSize, s.light_size.clone().unwrap_or_else(|| "off".to_owned())),
             (Field::Fit, s.fit.clone()),
             (Field::Opaque, on(s.opaque)),
+            (Field::FullDetail, on(s.full_detail)),
             (Field::Animation, s.animation.clone().unwrap_or_else(|| "off".to_owned())),
             (Field::Time, s.time_s.map_or("off".to_owned(), |time| time.to_string())),
             (Field::Without, s.without.join(" ")),

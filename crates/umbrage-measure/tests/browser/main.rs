@@ -405,6 +405,7 @@ fn a_sweeps_page_leads_to_its_views() {
             light_size: None,
             fit: "box".to_owned(),
             opaque: true,
+            full_detail: false,
             animation: Some(nasty.to_owned()),
             time_s: Some(1.5),
             without: vec![nasty.to_owned()],

@@ -55,15 +55,19 @@ struct Vertex {
     @location(3) render_from_mesh_z: vec4f,
     // Texture coordinates and, as the fourth component, alpha. Scenes without alphas give 1.
     @location(4) uv_alpha: vec4f,
-    @location(5) normal: vec3f,
+    // See `unpacked`.
+    @location(5) normal: u32,
 }
 
 struct Fragment {
-    @builtin(position) clip: vec4f,
+    // The pass that draws depths ahead must find the very same ones.
+    @builtin(position) @invariant clip: vec4f,
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     // Texture coordinates and alpha.
     @location(2) uv_alpha: vec3f,
+    // The number of the cluster of triangles, and how often these were simplified.
+    @location(3) @interpolate(flat) cluster: vec2u,
 }
 
 @vertex
@@ -73,16 +77,32 @@ fn mesh_vertex(vertex: Vertex) -> Fragment {
     let z = vertex.render_from_mesh_z;
     let point = vec4f(vertex.position, 1.0);
     let position = vec3f(dot(x, point), dot(y, point), dot(z, point));
-    // Normals transform by the cofactor matrix. Its sign does not matter, because normals are
-    // turned to the visible side.
-    let n = vertex.normal;
-    let normal = vec3f(
-        dot(cross(y.xyz, z.xyz), n),
-        dot(cross(z.xyz, x.xyz), n),
-        dot(cross(x.xyz, y.xyz), n),
-    );
+    let normal = turned_normal(x.xyz, y.xyz, z.xyz, vertex.normal);
     let clip = view.clip_from_render * vec4f(position, 1.0);
-    return Fragment(clip, position, normalize_or_zero(normal), vertex.uv_alpha.xyw);
+    return Fragment(clip, position, normal, vertex.uv_alpha.xyw, vec2u(0u));
+}
+
+// A normal of mesh space in render space. Normals transform by the cofactor matrix, of whose rows
+// the arguments are those of the matrix itself. Its sign does not matter, because normals are turned
+// to the visible side.
+fn turned_normal(x: vec3f, y: vec3f, z: vec3f, packed: u32) -> vec3f {
+    let n = unpacked(packed);
+    return normalize_or_zero(vec3f(
+        dot(cross(y, z), n),
+        dot(cross(z, x), n),
+        dot(cross(x, y), n),
+    ));
+}
+
+// A normal of which `packed` in `scene.rs` is the inverse.
+fn unpacked(packed: u32) -> vec3f {
+    if (packed == 0x80008000u) {
+        return vec3f(0.0);
+    }
+    let at = unpack2x16snorm(packed);
+    let z = 1.0 - abs(at.x) - abs(at.y);
+    let fold = max(-z, 0.0);
+    return vec3f(at - select(vec2f(fold), vec2f(-fold), at < vec2f(0.0)), z);
 }
 
 @vertex

@@ -8,14 +8,24 @@ use std::f32::consts::{PI, TAU};
 const SPACING: f64 = 13.5;
 /// Distance between lines, metres.
 const LINES: f64 = 26.0;
+/// Planes in a line, as far as [`SHORT_LINES`] do for all of them.
 const PLANES_IN_LINE: u32 = 8;
+/// The largest number of planes that stand in short lines. More of them form a square, because the
+/// lines would extend over a hundred kilometres.
+const SHORT_LINES: u32 = 4000;
 
-/// `size` planes in lines before hangars, a tower and a runway, after the airplanes of Zhang et al.
-/// 2009 (W&P): thin wings, struts, wires and propellers over long flat ground.
+/// `size` planes, of some 9000 triangles each, in lines before hangars, a tower and a runway, after
+/// the airplanes of Zhang et al. 2009 (W&P): thin wings, struts, wires and propellers over long
+/// flat ground.
 pub(super) fn airfield(size: u32) -> Scene {
     let mut stage = Stage::new("airfield");
-    let lines = size.div_ceil(PLANES_IN_LINE);
-    let length = f64::from(PLANES_IN_LINE) * SPACING;
+    let in_line = if size <= SHORT_LINES {
+        PLANES_IN_LINE
+    } else {
+        (f64::from(size) * LINES / SPACING).sqrt().ceil() as u32
+    };
+    let lines = size.div_ceil(in_line);
+    let length = f64::from(in_line) * SPACING;
     let width = f64::from(lines) * LINES;
     let reach = (length.max(width) + 130.0) as f32;
     let grass = stage.paint("grass", [0.21, 0.24, 0.09]);
@@ -26,7 +36,7 @@ pub(super) fn airfield(size: u32) -> Scene {
     let kinds = planes(&mut stage);
     let mut vary = Variation::new(15);
     for k in 0..size {
-        let (line, place) = (k / PLANES_IN_LINE, k % PLANES_IN_LINE);
+        let (line, place) = (k / in_line, k % in_line);
         let x = (f64::from(line) + 0.5) * LINES + f64::from(vary.range(-0.6, 0.6));
         let z = -(f64::from(place) + 0.5) * SPACING + f64::from(vary.range(-0.5, 0.5));
         // Lines face each other across the taxiway between them.

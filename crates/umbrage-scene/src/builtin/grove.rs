@@ -8,7 +8,7 @@ use std::f32::consts::TAU;
 /// Distance between the trees before each is displaced at random, metres.
 const SPACING: f64 = 5.6;
 
-/// `size` trees of five kinds along a winding path.
+/// `size` trees of five kinds, of some 10,000 triangles each, along a winding path.
 pub(super) fn grove(size: u32) -> Scene {
     let mut stage = Stage::new("grove");
     let columns = f64::from(size).sqrt().ceil();
@@ -16,11 +16,16 @@ pub(super) fn grove(size: u32) -> Scene {
     let grass = stage.paint("grass", [0.16, 0.22, 0.06]);
     let mut land = MeshBuilder::new();
     let reach = half as f32 + 25.0;
-    land.surface([160, 160], |u, v| ground(Vec3::new(v - 0.5, 0.0, u - 0.5) * 2.0 * reach));
+    // Of large groves, the quads of the ground stay as large as in those of 4000 trees, so that
+    // trees stand on it.
+    let cells = |least: u32, length: f32| least.max((2.0 * reach / length).ceil() as u32);
+    land.surface([cells(160, 2.56); 2], |u, v| {
+        ground(Vec3::new(v - 0.5, 0.0, u - 0.5) * 2.0 * reach)
+    });
     stage.set(land, grass);
     let earth = stage.paint("trodden earth", [0.30, 0.21, 0.13]);
     let mut trail = MeshBuilder::new();
-    trail.surface([12, 240], |u, v| {
+    trail.surface([12, cells(240, 1.71)], |u, v| {
         let z = (0.5 - v) * 2.0 * reach;
         let x = path(f64::from(z)) as f32 + (u - 0.5) * 2.4;
         // The edges of the trail are sunk into the grass.

@@ -2,6 +2,7 @@
 
 mod airfield;
 pub mod closed_form;
+mod colossus;
 mod contacts;
 mod fence;
 mod grove;
@@ -28,7 +29,8 @@ pub struct BuiltinInfo {
     pub size_means: &'static str,
     /// The size by default, quick to build and rich enough to look at.
     pub default_size: u32,
-    /// The largest valid size, which draws many millions of triangles.
+    /// The largest valid size, which draws many millions of triangles. Only `colossus` stores that
+    /// many, with 24 bytes each.
     pub max_size: u32,
     build: fn(u32) -> Scene,
 }
@@ -39,7 +41,7 @@ const BUILTINS: &[BuiltinInfo] = &[
         about: "A street of houses, lamps and trees, hundreds of metres deep, seen from its pavement",
         size_means: "pairs of houses along the street",
         default_size: 28,
-        max_size: 3000,
+        max_size: 12_000,
         build: town::town,
     },
     BuiltinInfo {
@@ -47,7 +49,7 @@ const BUILTINS: &[BuiltinInfo] = &[
         about: "Planes with struts, wires and propellers before hangars and a runway",
         size_means: "planes",
         default_size: 15,
-        max_size: 4000,
+        max_size: 40_000,
         build: airfield::airfield,
     },
     BuiltinInfo {
@@ -55,15 +57,23 @@ const BUILTINS: &[BuiltinInfo] = &[
         about: "Ornate statues, evenly spaced on a plane",
         size_means: "statues along each side of their square",
         default_size: 5,
-        max_size: 40,
+        max_size: 120,
         build: statues::statues,
+    },
+    BuiltinInfo {
+        name: "colossus",
+        about: "An unfinished statue ten metres high, a single mesh that nowhere repeats itself",
+        size_means: "hundred thousands of triangles of its stone",
+        default_size: 2,
+        max_size: 4000,
+        build: colossus::colossus,
     },
     BuiltinInfo {
         name: "grove",
         about: "Trees with thin branches and cut-out leaves along a path",
         size_means: "trees",
         default_size: 40,
-        max_size: 4000,
+        max_size: 40_000,
         build: grove::grove,
     },
     BuiltinInfo {

@@ -1,6 +1,6 @@
 use super::mesh_builder::MeshBuilder;
 use crate::types::{
-    self, Alpha, Instance, Material, Scene, SceneCamera, SceneLight, Texture, TextureId,
+    self, Alpha, Instance, Material, Mesh, Scene, SceneCamera, SceneLight, Texture, TextureId,
 };
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 use umbrage::{Light, PointLight, SpotLight};
@@ -56,12 +56,33 @@ impl Stage {
     }
 
     pub(super) fn shape(&mut self, builder: MeshBuilder, paint: Paint) -> Shape {
-        self.scene.meshes.push(builder.finish(paint.0));
+        self.mesh(|material| builder.finish(material), paint)
+    }
+
+    /// Adds a mesh, which is made for the index of its material.
+    pub(super) fn mesh(&mut self, make: impl FnOnce(usize) -> Mesh, paint: Paint) -> Shape {
+        self.scene.meshes.push(make(paint.0));
         Shape(self.scene.meshes.len() - 1)
     }
 
     pub(super) fn place(&mut self, shape: Shape, world_from_mesh: DAffine3) {
         self.scene.instances.push(Instance { mesh: shape.0, world_from_mesh });
+    }
+
+    /// How many shapes have been placed.
+    pub(super) fn placed(&self) -> usize {
+        self.scene.instances.len()
+    }
+
+    /// Places all but the first `first` shapes again, so that they stand `times` times in a row,
+    /// `step` apart.
+    pub(super) fn repeat(&mut self, first: usize, times: u32, step: DVec3) {
+        let row = self.scene.instances[first..].to_vec();
+        for k in 1..times {
+            let by = DAffine3::from_translation(step * f64::from(k));
+            let moved = |i: &Instance| Instance { world_from_mesh: by * i.world_from_mesh, ..*i };
+            self.scene.instances.extend(row.iter().map(moved));
+        }
     }
 
     /// Adds a shape with a single instance, in the space that it was built in.

@@ -13,11 +13,20 @@ const KERB: f32 = 4.2;
 /// Distance of the facades from the middle of the street, metres.
 const FACADE: f64 = 7.4;
 
-/// A street of `size` pairs of houses, some hundred metres deep, after the town of Wimmer et al.
+/// The largest number of pairs of houses along one street. More of them stand along streets side by
+/// side, because meshes that extend over more than some thirty kilometres lose precision.
+const IN_STREET: u32 = 3000;
+/// Distance between neighbouring streets, metres.
+const BLOCK: f64 = 110.0;
+
+/// A street of `size` pairs of houses, of some 33,000 triangles each with what stands around, some
+/// hundred metres deep, after the town of Wimmer et al.
 /// 2004 (LiSPSM). Lamps, trees and wires are near, roofs and a church far away.
 pub(super) fn town(size: u32) -> Scene {
     let mut stage = Stage::new("town");
-    let length = f64::from(size) * FRONT;
+    let streets = size.div_ceil(IN_STREET);
+    let length = f64::from(size.div_ceil(streets)) * FRONT;
+    let meadow = meadow(&mut stage, length as f32);
     street(&mut stage, length as f32);
     let kinds = houses(&mut stage);
     let mut vary = Variation::new(11);
@@ -41,17 +50,24 @@ pub(super) fn town(size: u32) -> Scene {
     }
     furniture(&mut stage, length, &mut vary);
     church(&mut stage, Vec3::new(0.0, 0.0, -length as f32 - 32.0));
+    // All streets lie in the one meadow.
+    stage.repeat(meadow, streets, DVec3::X * BLOCK);
     let lens = Lens { fov_y_deg: 48.0, near: 0.3, far: length + 130.0 };
     stage.camera("pavement", DVec3::new(-3.1, 2.3, 9.0), DVec3::new(0.9, 2.7, -14.0), lens);
     stage.sun(DVec3::new(-0.42, -0.66, 0.50));
     stage.finish()
 }
 
-/// Meadows, carriageway, kerbs and markings.
-fn street(stage: &mut Stage, length: f32) {
+/// The ground; returns the number of instances that it consists of.
+fn meadow(stage: &mut Stage, length: f32) -> usize {
     let meadow = stage.paint("meadow", [0.19, 0.22, 0.08]);
     let reach = length / 2.0 + 90.0;
     stage.ground(Vec3::new(0.0, -0.02, -length / 2.0), reach, 1, meadow);
+    stage.placed()
+}
+
+/// Carriageway, kerbs and markings.
+fn street(stage: &mut Stage, length: f32) {
     let asphalt = stage.paint("cobbles", [0.20, 0.19, 0.185]);
     let slabs = stage.paint("slabs", [0.44, 0.42, 0.38]);
     let white = stage.paint("markings", [0.75, 0.75, 0.72]);

@@ -14,8 +14,8 @@ use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 use umbrage_lab::{
-    Executors, Fit, LightOptions, PreparedScene, SceneOptions, ViewOptions, choose_light,
-    choose_view, open_scene,
+    Detail, DetailOptions, Executors, Fit, LightOptions, PreparedScene, SceneOptions, ViewOptions,
+    choose_light, choose_view, open_scene,
 };
 use umbrage_render::Gpu;
 
@@ -91,7 +91,13 @@ fn open_and_draw(
     let clip = clip.as_ref().map(find).transpose()?;
     stage("preparing")?;
     let executors = Executors::with_gpu(gpu);
-    let prepared = PreparedScene::new(&scene, &executors, *opaque, Fit::Surfaces)
+    // Scenes that move have no levels of detail.
+    let detail = match scene.animation_choices().is_empty() {
+        true => DetailOptions::Auto,
+        false => DetailOptions::Full,
+    };
+    let detail = Detail::new(&scene, &executors, &detail, &()).map_err(|e| e.to_string())?;
+    let prepared = PreparedScene::new(&scene, &executors, *opaque, Fit::Surfaces, &detail)
         .map_err(|e| e.to_string())?;
     stage("choosing a view")?;
     let chosen = choose_view(view, prepared.defaults()).map_err(|e| e.to_string())?;

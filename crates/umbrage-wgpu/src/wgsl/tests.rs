@@ -150,6 +150,15 @@ fn every_other_module_is_valid() {
             validated(&mesh(&support, is_masked));
         }
         validated(&caster(3, &support));
+        for layout in attribute_layouts() {
+            for is_masked in [true, false] {
+                validated(&cluster_caster(&support, layout, is_masked));
+            }
+            validated(&cluster_vertex(3, layout));
+        }
+    }
+    for text in [cluster_descent(), cluster_draws(), cluster_indices()] {
+        validated(&text);
     }
     validated(include_str!("clear.wesl"));
     for is_multisampled in [false, true] {
@@ -263,6 +272,73 @@ fn structs_are_laid_out_alike() {
 }
 
 #[test]
+fn structs_of_clusters_are_laid_out_alike() {
+    use crate::clusters::data as ours;
+    let spans = |text: &str, structs: &[(&str, &[usize], usize)]| {
+        let (module, _) = validated(text);
+        for &(name, offsets, size) in structs {
+            let (members, span) = layout(&module, name);
+            let theirs: Vec<usize> = members.into_iter().map(|(_, offset)| offset).collect();
+            assert_eq!(theirs, offsets, "{name}");
+            assert_eq!(span, size, "{name}");
+        }
+    };
+    macro_rules! offsets {
+        ($type:ty, [$($field:ident),*]) => {
+            (&[$(offset_of!($type, $field)),*][..], size_of::<$type>())
+        };
+    }
+    let of = |name, (offsets, size): (&'static [usize], usize)| (name, offsets, size);
+    spans(
+        &cluster_descent(),
+        &[
+            ("ShadowClusterNode", &[0, 12, 16, 20, 24, 28], size_of::<ours::Node>()),
+            ("ShadowCluster", &[0, 12, 16, 28, 32, 36, 40, 44, 48], size_of::<ours::Cluster>()),
+            of(
+                "ShadowClusterView",
+                offsets!(
+                    ours::View,
+                    [
+                        s,
+                        t,
+                        w,
+                        densest,
+                        nearest,
+                        slope,
+                        share,
+                        first_plane,
+                        plane_count,
+                        first_draw,
+                        roles,
+                        is_picture
+                    ]
+                ),
+            ),
+            of("ShadowClusterDescent", offsets!(ours::Descent, [origin, queue, choices])),
+            of("ShadowClusterItem", offsets!(ours::Item, [view, instance, node])),
+            of("ShadowClusterChoice", offsets!(ours::Choice, [instance, cluster, draw, first])),
+            of("ShadowClusterOrigin", offsets!(ours::Origin, [high, low])),
+            (
+                "ShadowClusterInstance",
+                &[0, 16, 32, 48, 60, 64, 68, 72, 76],
+                size_of::<ours::Instance>(),
+            ),
+        ],
+    );
+    spans(
+        &cluster_draws(),
+        &[
+            of("ShadowClusterDrawing", offsets!(ours::Drawing, [draws, spans, choices, triangles])),
+            of("ShadowClusterSpan", offsets!(ours::Span, [first, count])),
+        ],
+    );
+    spans(
+        &cluster_indices(),
+        &[of("ShadowClusterIndexing", offsets!(ours::Indexing, [choices, triangles]))],
+    );
+}
+
+#[test]
 fn uniform_arrays_fit_where_least_is_guaranteed() {
     let least = wgpu::Limits::downlevel_webgl2_defaults().max_uniform_buffer_binding_size;
     assert!((size_of::<data::Light>() * MAX_LIGHTS) as u64 <= least);
@@ -299,6 +375,12 @@ fn lookups() -> Vec<Shader> {
     unlike(variants().map(|options| lookup_shader(2, &options)))
 }
 
+/// A layout of each kind.
+fn attribute_layouts() -> [AttributeLayout; 3] {
+    let layout = |uv, alpha| AttributeLayout { stride: 5, uv, alpha };
+    [layout(None, None), layout(Some(1), None), layout(Some(1), Some(4))]
+}
+
 /// A shader of every kind.
 fn shaders() -> Vec<Shader> {
     let mut shaders = lookups();
@@ -316,6 +398,12 @@ fn shaders() -> Vec<Shader> {
         shaders.extend([true, false].map(|is_masked| mesh_shader(&support, is_masked)));
     }
     shaders.extend([false, true].map(seen_shader));
+    for layout in attribute_layouts() {
+        let caster = |is_masked| cluster_caster_shader(&Support::FULL, layout, is_masked);
+        shaders.extend([true, false].map(caster));
+        shaders.push(cluster_picture_shader(2, layout));
+    }
+    shaders.extend([cluster_descent_shader(), cluster_draws_shader(), cluster_indices_shader()]);
     unlike(shaders.into_iter())
 }
 

@@ -1,0 +1,16 @@
+//! Clusters of triangles in levels of detail: what they are on a device, how they are chosen for
+//! views, and how they are drawn into maps.
+
+mod casters;
+pub(crate) mod data;
+mod geometry;
+mod selection;
+mod tree;
+mod view;
+
+pub use casters::ClusterCasters;
+pub use geometry::{
+    AttributeLayout, ClusterGeometry, ClusterInstance, ClusterSource, ClusterVertices,
+};
+pub use selection::{ClusterCounts, ClusterSelection};
+pub use view::ClusterView;
