@@ -142,7 +142,7 @@ impl ClusterGeometry {
         let mesh_nodes = lists.nodes.len() as u32;
         let most_triangles = instances.iter().map(|i| finest.get(i.mesh).copied().unwrap_or(0));
         let most_triangles = most_triangles.sum();
-        let placed = Placed::new(instances, &roots, mesh_nodes)?;
+        let placed = Placed::new(instances, &roots, mesh_nodes, None)?;
         lists.nodes.extend_from_slice(&placed.nodes);
         let limits = device.limits();
         let largest = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -177,7 +177,10 @@ impl ClusterGeometry {
             vertices: buffer(device, &lists.vertices, BufferUsages::STORAGE),
             triangles: buffer(device, lists.triangles.as_flattened(), BufferUsages::STORAGE),
             instances: buffer(device, &placed.data, usage),
-            positions: vertices.positions.clone(),
+            positions: match vertices.positions.size() {
+                0 => buffer(device, &[0.0f32; 3], BufferUsages::STORAGE),
+                _ => vertices.positions.clone(),
+            },
             attributes,
             layout,
             origin: placed.origin,
@@ -200,7 +203,8 @@ impl ClusterGeometry {
     /// # Errors
     /// [`Error::Invalid`] if they are others, or if a transform is not finite.
     pub fn place(&mut self, queue: &Queue, instances: &[ClusterInstance]) -> Result<(), Error> {
-        let placed = Placed::new(instances, &self.roots, self.mesh_nodes)?;
+        // With another origin, rounding would move what stands still.
+        let placed = Placed::new(instances, &self.roots, self.mesh_nodes, Some(self.origin))?;
         if placed.data.len() != self.instance_count {
             return Err(Error::Invalid {
                 field: "instances",
@@ -214,7 +218,6 @@ impl ClusterGeometry {
         let begin = u64::from(self.mesh_nodes) * size_of::<data::Node>() as u64;
         queue.write_buffer(&self.nodes, begin, bytemuck::cast_slice(&placed.nodes));
         queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&placed.data));
-        self.origin = placed.origin;
         self.rounds = placed.rounds + self.mesh_rounds;
         Ok(())
     }
@@ -261,6 +264,7 @@ impl Placed {
         instances: &[ClusterInstance],
         roots: &[Option<(u32, Ball)>],
         first_node: u32,
+        origin: Option<DVec3>,
     ) -> Result<Self, Error> {
         let invalid = |i: usize, problem: String| Error::Invalid {
             field: "instances",
@@ -285,7 +289,8 @@ impl Placed {
             max = max.max(center);
             placed.push((i, root, center, f64::from(ball.radius) * stretch, stretch));
         }
-        let origin = if placed.is_empty() { DVec3::ZERO } else { 0.5 * (min + max) };
+        let middle = if placed.is_empty() { DVec3::ZERO } else { 0.5 * (min + max) };
+        let origin = origin.unwrap_or(middle);
         let balls: Vec<Ball> = placed
             .iter()
             .map(|&(_, _, center, radius, _)| {

@@ -22,6 +22,9 @@ const MAX_QUEUE: u64 = 65_535 * 64;
 const MAX_CHOICES: u64 = 1 << 25;
 /// The factor by which more error is allowed where the device has no room for what is chosen.
 const RELIEF: f32 = 1.5;
+/// The error, texels or pixels, that relief begins at where none is allowed, of which no factor is
+/// any more.
+const LEAST_RELIEVED: f32 = 1.0 / 64.0;
 
 /// Chooses the clusters to draw for some views, on the device, and holds what to draw.
 #[derive(Debug)]
@@ -183,7 +186,9 @@ impl ClusterSelection {
         let mut draws = 0;
         for view in views {
             let mut own = view.data(planes.len() as u32, draws);
-            own.share *= self.relief;
+            if self.relief > 1.0 {
+                own.share = own.share.max(LEAST_RELIEVED) * self.relief;
+            }
             data.push(own);
             planes.extend_from_slice(&view.planes);
             let batches =

@@ -18,12 +18,19 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn open() -> Self {
+        Self::with_limits(|_| {})
+    }
+
+    /// A device with lower limits than it could have.
+    pub(crate) fn with_limits(lower: impl FnOnce(&mut wgpu::Limits)) -> Self {
         let instance = wgpu::Instance::default();
         let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
             .expect("a GPU, or a driver in software: run tools/setup");
+        let mut limits = adapter.limits();
+        lower(&mut limits);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             required_features: adapter.features() & Support::WANTED_FEATURES,
-            required_limits: adapter.limits(),
+            required_limits: limits,
             ..Default::default()
         }))
         .unwrap();

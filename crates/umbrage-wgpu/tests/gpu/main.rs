@@ -2,6 +2,7 @@
 
 mod caching;
 mod clamping;
+mod clusters;
 mod cookbook;
 mod device;
 mod kernels;

@@ -16,19 +16,19 @@ use umbrage_wgpu::{
 use wgpu::BufferUsages;
 
 /// Pseudorandom numbers in 0 .. 1.
-struct Random(u32);
+pub(crate) struct Random(pub(crate) u32);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         f64::from(self.0 >> 8) / f64::from(1 << 24)
     }
 
-    fn within(&mut self, aabb: Aabb) -> DVec3 {
+    pub(crate) fn within(&mut self, aabb: Aabb) -> DVec3 {
         aabb.min + aabb.size() * DVec3::from_array([(); 3].map(|()| self.next()))
     }
 
-    fn placed(&mut self) -> DAffine3 {
+    pub(crate) fn placed(&mut self) -> DAffine3 {
         let axis = DVec3::new(self.next(), self.next() + 0.1, self.next()).normalize();
         let turn = DQuat::from_axis_angle(axis, 6.0 * self.next());
         let scale = DVec3::splat(0.2 + self.next());
@@ -99,7 +99,7 @@ impl Boxes {
 }
 
 /// All bits of the depth texture and of the prefiltered maps.
-fn bits(bench: &Bench, shadows: &Shadows) -> Vec<u32> {
+pub(crate) fn bits(bench: &Bench, shadows: &Shadows) -> Vec<u32> {
     let texture = shadows.depth_texture();
     let layers = texture.depth_or_array_layers();
     let depths = (0..layers).flat_map(|layer| bench.depths(shadows, layer).0);
