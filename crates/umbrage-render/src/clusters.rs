@@ -4,14 +4,14 @@ use crate::renderer::{PipelineParts, Pipelines, shader_text};
 use crate::scene::{SceneBuffers, anchor};
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DMat4, DVec3};
 use std::collections::HashMap;
 use umbrage::{Camera, Plane};
 use umbrage_clusters::{Ball, ClusterMesh};
 use umbrage_scene::Scene;
 use umbrage_wgpu::{
-    AttributeLayout, ClusterCasters, ClusterGeometry, ClusterInstance, ClusterSelection,
-    ClusterSource, ClusterVertices, ClusterView, Shadows,
+    AttributeLayout, ClusterCasters, ClusterGeometry, ClusterInstance, ClusterOccluders,
+    ClusterSelection, ClusterSource, ClusterVertices, ClusterView, Shadows,
 };
 use wgpu::{
     BindGroupLayout, CompareFunction, PipelineLayout, PipelineLayoutDescriptor, RenderPipeline,
@@ -128,6 +128,8 @@ pub(crate) struct ClusterDrawing {
     pub(crate) casters: ClusterCasters,
     /// What is drawn of a picture.
     pub(crate) picture: ClusterSelection,
+    /// What hides parts of frames that follow one another.
+    pub(crate) occluders: ClusterOccluders,
     shader: ShaderModule,
     layout: PipelineLayout,
     /// Pipelines by the names of their fragment shaders, made at first use.
@@ -182,6 +184,7 @@ impl ClusterDrawing {
         Ok(Self {
             casters: ClusterCasters::new(device, shadows, geometry, ClusterCasters::SHARE)?,
             picture: ClusterSelection::new(device, &gpu.support(), geometry),
+            occluders: ClusterOccluders::new(device),
             depths,
             shader,
             layout,
@@ -216,7 +219,7 @@ pub(crate) fn picture_view(
     let m = view.clip_from_render.as_dmat4();
     let [width, height] = tile.size.map(f64::from);
     let w = m.row(3);
-    let rows = [(m.row(0) + w) * (0.5 * width), (w - m.row(1)) * (0.5 * height), DVec4::ZERO, w];
+    let rows = [(m.row(0) + w) * (0.5 * width), (w - m.row(1)) * (0.5 * height), m.row(2), w];
     let samples_from_render = DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
     let nearest = if camera.is_orthographic() { 1.0 } else { camera.near() };
     let share = share_px * tile.grid as f32;

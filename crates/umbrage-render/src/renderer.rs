@@ -1,4 +1,4 @@
-use crate::clusters::{ClusterDrawing, FRAME_SHARE_PX, picture_view};
+use crate::clusters::{ClusterDrawing, FRAME_SHARE_PX, SAMPLE_SHARE_PX, picture_view};
 use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::map_picture::MapPicture;
@@ -13,8 +13,8 @@ use std::collections::HashMap;
 use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
-    Bias, CasterInstance, Casters, ClusterCasters, DEPTH_FORMAT, DepthProjection, Frame, Mask,
-    MeshCasters, MeshKind, SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
+    Bias, CasterInstance, Casters, ClusterCasters, ClusterSelection, DEPTH_FORMAT, DepthProjection,
+    Frame, Mask, MeshCasters, MeshKind, SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
@@ -410,8 +410,7 @@ impl<'g> Renderer<'g> {
         let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
         let color = &[&target.color_view][..];
         let (depth, depth_store) = (&target.depth, StoreOp::Store);
-        let share_px = FRAME_SHARE_PX;
-        let parts = Target { color, depth, depth_store, share_px, pipelines: &pipelines };
+        let parts = Target { color, depth, depth_store, is_frame: true, pipelines: &pipelines };
         loop {
             let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
             let timer = timer.as_deref_mut();
@@ -437,12 +436,7 @@ impl<'g> Renderer<'g> {
         readback: &mut SeenReadback,
     ) -> Result<Option<SeenTiles>, Error> {
         let (device, queue) = (self.gpu.device(), self.gpu.queue());
-        // As `ViewUniform` has it.
-        let projection = if camera.is_orthographic() {
-            DepthProjection::orthographic(camera.near(), self.scene.farthest(camera), true)?
-        } else {
-            DepthProjection::of_range(camera.near(), f64::INFINITY, true)?
-        };
+        let projection = depth_projection(self.scene, camera)?;
         let mut encoder = device.create_command_encoder(&Default::default());
         readback.encode(device, queue, &mut encoder, &target.depth, projection, camera)?;
         queue.submit([encoder.finish()]);
@@ -491,36 +485,52 @@ impl<'g> Renderer<'g> {
         if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
             let choice = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
             let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
-            let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
+            let share_px = if target.is_frame { FRAME_SHARE_PX } else { SAMPLE_SHARE_PX };
+            let view = picture_view(camera, tile, &view, &planes, share_px)?;
             let (device, queue) = (gpu.device(), gpu.queue());
-            let ClusterDrawing { picture, depths, .. } = drawing;
+            let ClusterDrawing { picture, occluders, depths, .. } = drawing;
             let (geometry, eye) = (&own.geometry, camera.eye());
-            picture.encode(device, queue, encoder, geometry, &[view], eye, own.opaque, times)?;
-            let ahead = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                label: Some("depths"),
-                color_attachments: &[],
-                depth_stencil_attachment: Some(depth_attachment(
-                    target.depth,
-                    LoadOp::Clear(0.0),
-                    StoreOp::Store,
-                )),
-                timestamp_writes: writes(&ahead),
-                occlusion_query_set: None,
-                multiview_mask: None,
-            });
-            pass.set_pipeline(depths);
-            pass.set_bind_group(0, &self.view_group, &[]);
-            pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
-            if let Some(any) = scene.materials.first() {
-                pass.set_bind_group(2, &any.bind_group, &[]);
-            }
-            if let Some(group) = picture.vertex_group() {
+            let mut draw_depths = |encoder: &mut CommandEncoder, picture: &_, group: &_| {
+                let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+                let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                    label: Some("depths"),
+                    color_attachments: &[],
+                    depth_stencil_attachment: Some(depth_attachment(
+                        target.depth,
+                        LoadOp::Clear(0.0),
+                        StoreOp::Store,
+                    )),
+                    timestamp_writes: writes(&query),
+                    occlusion_query_set: None,
+                    multiview_mask: None,
+                });
+                pass.set_pipeline(depths);
+                pass.set_bind_group(0, &self.view_group, &[]);
+                pass.set_bind_group(1, self.shadows.lookup_bind_group(), &[]);
+                if let Some(any) = scene.materials.first() {
+                    pass.set_bind_group(2, &any.bind_group, &[]);
+                }
                 pass.set_bind_group(3, group, &[]);
-                picture.draw_together(&mut pass, 0);
+                ClusterSelection::draw_together(picture, &mut pass, 0);
+                drop(pass);
+                queries.extend(query);
+            };
+            let again = picture.draw_again(queue, geometry, eye).filter(|_| target.is_frame);
+            let hides = again.is_some();
+            if let Some(group) = again {
+                draw_depths(encoder, picture, group);
+                let projection = depth_projection(scene, camera)?;
+                let depth = target.depth;
+                occluders.encode(device, queue, encoder, geometry, depth, projection, &view)?;
             }
-            drop(pass);
-            queries.extend(choice.into_iter().chain(ahead));
+            let hides = hides.then_some(&*occluders);
+            let (views, together) = ([view], own.opaque);
+            picture
+                .encode(device, queue, encoder, geometry, &views, eye, together, hides, times)?;
+            if let Some(group) = picture.vertex_group() {
+                draw_depths(encoder, picture, group);
+            }
+            queries.extend(choice);
         } else {
             instances.begin(scene, camera.eye());
             list = instances.add_nearest_first(scene, camera.eye(), |aabb| {
@@ -602,6 +612,15 @@ pub(crate) fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
     })
 }
 
+/// How depths follow from distances, as `ViewUniform` has it.
+fn depth_projection(scene: &SceneBuffers, camera: &Camera) -> Result<DepthProjection, Error> {
+    Ok(if camera.is_orthographic() {
+        DepthProjection::orthographic(camera.near(), scene.farthest(camera), true)?
+    } else {
+        DepthProjection::of_range(camera.near(), f64::INFINITY, true)?
+    })
+}
+
 /// The bind group of camera, light and overlay, with its layout.
 fn view_bindings(
     device: &wgpu::Device,
@@ -639,8 +658,8 @@ pub(crate) struct Target<'a> {
     pub(crate) depth: &'a TextureView,
     /// Whether depths are kept for later passes.
     pub(crate) depth_store: StoreOp,
-    /// How far clusters may be off, pixels.
-    pub(crate) share_px: f32,
+    /// Whether the picture is to be looked at, and follows another one. Others are measured.
+    pub(crate) is_frame: bool,
     pub(crate) pipelines: &'a Pipelines,
 }
 

@@ -1,6 +1,5 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
-use crate::clusters::SAMPLE_SHARE_PX;
 use crate::renderer::{Drawn, Pipelines, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
@@ -152,17 +151,17 @@ impl Layers {
         // A tile at the edge of the picture is drawn into a corner of the textures.
         let device = renderer.gpu.device();
         let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
-        let (depth_store, share_px) = (StoreOp::Discard, SAMPLE_SHARE_PX);
+        let (depth_store, is_frame) = (StoreOp::Discard, false);
         loop {
             let mut encoder = device.create_command_encoder(&Default::default());
             let (color, pipelines) = (&[&first, &second][..], picture);
-            let target = Target { color, depth: &depth, depth_store, share_px, pipelines };
+            let target = Target { color, depth: &depth, depth_store, is_frame, pipelines };
             renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
             self.copy(&mut encoder, 0, 0);
             self.copy(&mut encoder, 1, 1);
             if let Some(pipelines) = texels {
                 let target =
-                    Target { color: &[&first], depth: &depth, depth_store, share_px, pipelines };
+                    Target { color: &[&first], depth: &depth, depth_store, is_frame, pipelines };
                 renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
                 self.copy(&mut encoder, 0, 2);
             }

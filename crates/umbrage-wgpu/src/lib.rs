@@ -79,7 +79,7 @@ mod wgsl;
 pub use casters::{CasterInstance, Mask, MeshCasters, MeshKind};
 pub use clusters::{
     AttributeLayout, ClusterCasters, ClusterCounts, ClusterGeometry, ClusterInstance,
-    ClusterSelection, ClusterSource, ClusterVertices, ClusterView,
+    ClusterOccluders, ClusterSelection, ClusterSource, ClusterVertices, ClusterView,
 };
 pub use error::Error;
 pub use passes::{MapPass, Prepared, Timestamps};

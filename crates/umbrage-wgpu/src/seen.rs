@@ -93,12 +93,21 @@ impl DepthProjection {
         Self { base: 1.0 - self.base, per_nearness: -self.per_nearness, ..self }
     }
 
-    fn check(self, camera: &Camera) -> Result<(), Error> {
-        let Self { base, per_nearness, is_orthographic } = self;
-        let invalid = |problem| Err(Error::Invalid { field: "depth", problem });
-        if !(base.is_finite() && per_nearness.is_finite() && per_nearness != 0.0) {
-            return invalid(format!("must be finite and depend on the distance, is {self:?}"));
+    pub(crate) fn check_finite(self) -> Result<(), Error> {
+        let Self { base, per_nearness, .. } = self;
+        if base.is_finite() && per_nearness.is_finite() && per_nearness != 0.0 {
+            return Ok(());
         }
+        Err(Error::Invalid {
+            field: "depth",
+            problem: format!("must be finite and depend on the distance, is {self:?}"),
+        })
+    }
+
+    fn check(self, camera: &Camera) -> Result<(), Error> {
+        self.check_finite()?;
+        let Self { is_orthographic, .. } = self;
+        let invalid = |problem| Err(Error::Invalid { field: "depth", problem });
         if is_orthographic != camera.is_orthographic() {
             let kind =
                 |is_orthographic| if is_orthographic { "orthographic" } else { "perspective" };
@@ -275,7 +284,7 @@ impl SeenReadback {
         camera: &Camera,
     ) -> Result<(), Error> {
         projection.check(camera)?;
-        check_depths(depth, camera)?;
+        check_depths(depth, camera.image())?;
         self.collect();
         let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) else {
             return Ok(());
@@ -371,11 +380,7 @@ impl Pending {
         let projection = self.projection;
         let base = f64::from(tile.base);
         // What rounding in the buffer and in the shader may have taken off.
-        let step = match self.format {
-            TextureFormat::Depth16Unorm => 2f64.powi(-17),
-            TextureFormat::Depth24Plus | TextureFormat::Depth24PlusStencil8 => 2f64.powi(-25),
-            _ => 0.0,
-        };
+        let step = depth_step(self.format);
         let [lo, hi] = tile.depths.to_array().map(f64::from);
         let slack = step + 2f64.powi(-22) * base.abs().max(lo.abs()).max(hi.abs());
         let mut nearness = [base + lo - slack, base + hi + slack].map(|d| projection.nearness(d));
@@ -389,7 +394,17 @@ impl Pending {
     }
 }
 
-fn check_depths(depth: &TextureView, camera: &Camera) -> Result<(), Error> {
+/// How far rounding to a format of fixed point may move depths.
+pub(crate) fn depth_step(format: TextureFormat) -> f64 {
+    match format {
+        TextureFormat::Depth16Unorm => 2f64.powi(-17),
+        TextureFormat::Depth24Plus | TextureFormat::Depth24PlusStencil8 => 2f64.powi(-25),
+        _ => 0.0,
+    }
+}
+
+/// Checks that shaders can read depths for a picture of this size in pixels.
+pub(crate) fn check_depths(depth: &TextureView, image: [u32; 2]) -> Result<(), Error> {
     let texture = depth.texture();
     let invalid = |problem| Err(Error::Invalid { field: "depth", problem });
     if !texture.format().has_depth_aspect() {
@@ -398,10 +413,10 @@ fn check_depths(depth: &TextureView, camera: &Camera) -> Result<(), Error> {
     if !texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
         return invalid("must have the usage TEXTURE_BINDING".into());
     }
-    let ([width, height], size) = (camera.image(), texture.size());
+    let ([width, height], size) = (image, texture.size());
     if width > size.width || height > size.height {
         return invalid(format!(
-            "must hold the camera's picture of {width}x{height} pixels, is {}x{}",
+            "must hold a picture of {width}x{height} pixels, is {}x{}",
             size.width, size.height
         ));
     }

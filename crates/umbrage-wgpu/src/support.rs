@@ -132,6 +132,7 @@ impl Support {
             && limits.max_compute_invocations_per_workgroup >= 64
             && limits.max_storage_buffers_per_shader_stage >= 1;
         let clusters = compute
+            && depth_fetch
             && backend != Backend::Gl
             && flags.contains(DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::INDIRECT_EXECUTION)
             && limits.max_compute_invocations_per_workgroup >= 256

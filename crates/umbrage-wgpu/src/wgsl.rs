@@ -488,6 +488,26 @@ fn cluster_descent_shader() -> Shader {
     shader
 }
 
+/// The text of the pass that makes the first level of a pyramid of distances.
+pub(crate) fn cluster_occluders() -> String {
+    cluster_occluders_shader().link()
+}
+
+fn cluster_occluders_shader() -> Shader {
+    let mut shader = Shader::new(module!("cluster_occluders"));
+    shader.add([module!("depths/single")]);
+    shader
+}
+
+/// The text of the pass that makes each of its further levels.
+pub(crate) fn cluster_farther() -> String {
+    cluster_farther_shader().link()
+}
+
+fn cluster_farther_shader() -> Shader {
+    Shader::new(module!("cluster_farther"))
+}
+
 /// The text of the pass that gives draws of clusters their ranges of the index buffer.
 pub(crate) fn cluster_draws() -> String {
     cluster_draws_shader().link()

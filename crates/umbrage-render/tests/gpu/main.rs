@@ -1,5 +1,6 @@
 //! On a real device, lavapipe where there is no other.
 
+mod clusters;
 mod overlays;
 mod parity;
 mod pictures;

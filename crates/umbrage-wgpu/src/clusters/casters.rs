@@ -96,7 +96,7 @@ impl ClusterCasters {
         }
         let origin = prepared.render_origin;
         let Self { selection, .. } = self;
-        selection.encode(device, queue, encoder, geometry, &views, origin, 0, timestamps)
+        selection.encode(device, queue, encoder, geometry, &views, origin, 0, None, timestamps)
     }
 
     /// Draws what was chosen for a map. `mask_of` gives the [mask](Self::mask) of each batch of

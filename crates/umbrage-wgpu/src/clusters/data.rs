@@ -2,7 +2,7 @@
 //! its comment names.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use umbrage_clusters::{Ball, ClusterMesh};
 
 /// `ShadowClusterNode`.
@@ -135,6 +135,27 @@ pub(crate) struct Indexing {
 pub(crate) struct Span {
     pub(crate) first: u32,
     pub(crate) count: u32,
+}
+
+/// `ShadowClusterOccluders`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Occluders {
+    pub(crate) distance: Vec4,
+    pub(crate) size: Vec2,
+    pub(crate) levels: u32,
+    pub(crate) padding: u32,
+}
+
+/// `ShadowClusterPicture`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Picture {
+    pub(crate) size: [u32; 2],
+    pub(crate) base: f32,
+    pub(crate) per_nearness: f32,
+    pub(crate) is_orthographic: u32,
+    pub(crate) step: f32,
 }
 
 /// The places in the buffer of counts, as in `wgsl/cluster_types.wesl`.

@@ -1,16 +1,18 @@
 use super::data::{self, Lists};
-use super::tree;
 use super::view::stretch;
+use super::{occluders, tree};
 use crate::{Error, Support, wgsl};
 use glam::{DAffine3, DVec3};
 use std::mem::size_of_val;
 use umbrage_clusters::{Ball, ClusterMesh};
 use wgpu::util::DeviceExt;
 use wgpu::{
-    BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, Buffer,
-    BufferBindingType, BufferUsages, ComputePipeline, ComputePipelineDescriptor, Device,
-    PipelineCompilationOptions, PipelineLayoutDescriptor, Queue, ShaderModuleDescriptor,
-    ShaderSource, ShaderStages,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferUsages,
+    ComputePipeline, ComputePipelineDescriptor, Device, PipelineCompilationOptions,
+    PipelineLayoutDescriptor, Queue, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    StorageTextureAccess, TextureFormat, TextureSampleType, TextureViewDescriptor,
+    TextureViewDimension,
 };
 
 /// Meshes as clusters, and instances of them, on a device. Vertices stay in your own buffers.
@@ -42,6 +44,10 @@ pub struct ClusterGeometry {
     pub(crate) seen_batches: u32,
     pub(crate) caster_batches: u32,
     pub(crate) pipelines: Pipelines,
+    /// With which clusters are chosen where nothing hides any.
+    pub(crate) nothing_hides: BindGroup,
+    /// How often instances were placed.
+    pub(crate) placements: u64,
 }
 
 /// A mesh of a [`ClusterGeometry`].
@@ -92,11 +98,16 @@ pub(crate) struct Pipelines {
     pub(crate) descend: ComputePipeline,
     pub(crate) draws: ComputePipeline,
     pub(crate) indices: ComputePipeline,
+    pub(crate) occluders: ComputePipeline,
+    pub(crate) farther: ComputePipeline,
     pub(crate) descent_layout: BindGroupLayout,
     pub(crate) round_layout: BindGroupLayout,
     pub(crate) draws_layout: BindGroupLayout,
     pub(crate) indices_layout: BindGroupLayout,
     pub(crate) vertex_layout: BindGroupLayout,
+    pub(crate) hidden_layout: BindGroupLayout,
+    pub(crate) occluders_layout: BindGroupLayout,
+    pub(crate) farther_layout: BindGroupLayout,
 }
 
 impl ClusterGeometry {
@@ -171,6 +182,7 @@ impl ClusterGeometry {
         let seen_batches = batches(|i| i.seen_batch);
         let caster_batches = batches(|i| i.caster_batch);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let pipelines = Pipelines::new(device);
         Ok(Self {
             nodes: buffer(device, &lists.nodes, usage),
             clusters: buffer(device, &lists.clusters, BufferUsages::STORAGE),
@@ -193,7 +205,9 @@ impl ClusterGeometry {
             most_triangles,
             seen_batches,
             caster_batches,
-            pipelines: Pipelines::new(device),
+            nothing_hides: nothing_hides(device, &pipelines),
+            pipelines,
+            placements: 0,
         })
     }
 
@@ -219,6 +233,7 @@ impl ClusterGeometry {
         queue.write_buffer(&self.nodes, begin, bytemuck::cast_slice(&placed.nodes));
         queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&placed.data));
         self.rounds = placed.rounds + self.mesh_rounds;
+        self.placements += 1;
         Ok(())
     }
 
@@ -343,6 +358,20 @@ pub(crate) fn buffer<T: bytemuck::Pod>(
     })
 }
 
+fn nothing_hides(device: &Device, pipelines: &Pipelines) -> BindGroup {
+    let distances = occluders::pyramid(device, [1, 1], 1);
+    let none = buffer(device, &[data::Occluders::default()], BufferUsages::UNIFORM);
+    let view = distances.create_view(&TextureViewDescriptor::default());
+    device.create_bind_group(&BindGroupDescriptor {
+        label: Some("cluster occluders"),
+        layout: &pipelines.hidden_layout,
+        entries: &[
+            BindGroupEntry { binding: 0, resource: none.as_entire_binding() },
+            BindGroupEntry { binding: 1, resource: BindingResource::TextureView(&view) },
+        ],
+    })
+}
+
 impl Pipelines {
     fn new(device: &Device) -> Self {
         use BufferBindingType::Uniform;
@@ -374,6 +403,34 @@ impl Pipelines {
             layout(compute, &[Uniform, READ, READ, READ, READ, READ, WRITTEN, WRITTEN], false);
         let vertex_layout =
             layout(ShaderStages::VERTEX, &[Uniform, READ, READ, READ, READ, READ], false);
+        let of_types = |types: &[BindingType]| {
+            let entries = (0..).zip(types).map(|(binding, &ty)| BindGroupLayoutEntry {
+                binding,
+                visibility: compute,
+                ty,
+                count: None,
+            });
+            device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+                label: Some("cluster occluders"),
+                entries: &entries.collect::<Vec<_>>(),
+            })
+        };
+        let uniform =
+            BindingType::Buffer { ty: Uniform, has_dynamic_offset: false, min_binding_size: None };
+        let texture = |sample_type| BindingType::Texture {
+            sample_type,
+            view_dimension: TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let distances = texture(TextureSampleType::Float { filterable: false });
+        let written = BindingType::StorageTexture {
+            access: StorageTextureAccess::WriteOnly,
+            format: TextureFormat::R32Float,
+            view_dimension: TextureViewDimension::D2,
+        };
+        let hidden_layout = of_types(&[uniform, distances]);
+        let occluders_layout = of_types(&[texture(TextureSampleType::Depth), uniform, written]);
+        let farther_layout = of_types(&[distances, written]);
         let pipeline = |text: String, layouts: &[Option<&BindGroupLayout>]| {
             let module = device.create_shader_module(ShaderModuleDescriptor {
                 label: Some("shadow clusters"),
@@ -396,15 +453,20 @@ impl Pipelines {
         Self {
             descend: pipeline(
                 wgsl::cluster_descent(),
-                &[Some(&descent_layout), Some(&round_layout)],
+                &[Some(&descent_layout), Some(&round_layout), Some(&hidden_layout)],
             ),
             draws: pipeline(wgsl::cluster_draws(), &[Some(&draws_layout)]),
             indices: pipeline(wgsl::cluster_indices(), &[Some(&indices_layout)]),
+            occluders: pipeline(wgsl::cluster_occluders(), &[Some(&occluders_layout)]),
+            farther: pipeline(wgsl::cluster_farther(), &[Some(&farther_layout)]),
             descent_layout,
             round_layout,
             draws_layout,
             indices_layout,
             vertex_layout,
+            hidden_layout,
+            occluders_layout,
+            farther_layout,
         }
     }
 }

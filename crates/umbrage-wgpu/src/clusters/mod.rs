@@ -4,6 +4,7 @@
 mod casters;
 pub(crate) mod data;
 mod geometry;
+mod occluders;
 mod selection;
 mod tree;
 mod view;
@@ -12,5 +13,6 @@ pub use casters::ClusterCasters;
 pub use geometry::{
     AttributeLayout, ClusterGeometry, ClusterInstance, ClusterSource, ClusterVertices,
 };
+pub use occluders::ClusterOccluders;
 pub use selection::{ClusterCounts, ClusterSelection};
 pub use view::ClusterView;

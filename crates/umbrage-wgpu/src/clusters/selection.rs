@@ -1,5 +1,6 @@
 use super::data::{self, Descent, Drawing, Indexing, Item, Origin, Span};
 use super::geometry::{ClusterGeometry, buffer};
+use super::occluders::ClusterOccluders;
 use super::view::ClusterView;
 use crate::{Error, Support};
 use glam::DVec3;
@@ -39,6 +40,8 @@ pub struct ClusterSelection {
     slots: Vec<Slot>,
     /// How often something was chosen, and how often when the newest counts were made.
     encoded: u64,
+    /// The placements of instances for which something was chosen last.
+    placements: u64,
     counted: u64,
     counts: ClusterCounts,
 }
@@ -150,6 +153,7 @@ impl ClusterSelection {
             draws: 0,
             slots: slots.collect(),
             encoded: 0,
+            placements: 0,
             counted: 0,
             counts: ClusterCounts { triangles: 0, clusters: 0, is_complete: true, relief: 1.0 },
         }
@@ -158,6 +162,8 @@ impl ClusterSelection {
     /// Encodes the choice of clusters for some views. Points of render space are relative to
     /// `render_origin` (world space, metres). In each view, draws of `0..batches` follow one
     /// another; one draw of the batches `0..together` of each view comes for free.
+    /// Pictures leave out what `occluders` hide, which must be those of the one picture among the
+    /// views.
     ///
     /// # Errors
     /// [`Error::Invalid`] if `render_origin` is not finite.
@@ -171,6 +177,7 @@ impl ClusterSelection {
         views: &[ClusterView],
         render_origin: DVec3,
         together: u32,
+        occluders: Option<&ClusterOccluders>,
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) -> Result<(), Error> {
         if !render_origin.is_finite() {
@@ -254,6 +261,8 @@ impl ClusterSelection {
             let pipelines = &geometry.pipelines;
             pass.set_pipeline(&pipelines.descend);
             pass.set_bind_group(0, &buffers.descent_group, &[]);
+            let hides = occluders.and_then(ClusterOccluders::group);
+            pass.set_bind_group(2, hides.unwrap_or(&geometry.nothing_hides), &[]);
             for round in 0..geometry.rounds.min(MAX_ROUNDS as u32) {
                 let is_odd = round as usize & 1;
                 pass.set_bind_group(1, &buffers.round_groups[is_odd], &[round * self.alignment]);
@@ -268,6 +277,7 @@ impl ClusterSelection {
             pass.dispatch_workgroups_indirect(&buffers.index_groups, 0);
         }
         self.encoded += 1;
+        self.placements = geometry.placements;
         if let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) {
             encoder.copy_buffer_to_buffer(&buffers.counts, 0, &slot.readback, 0, COUNTED * 4);
             slot.state.store(WAITING, Ordering::Release);
@@ -283,6 +293,23 @@ impl ClusterSelection {
     /// The bind group with which vertex stages read what was chosen last; `None` before that.
     pub fn vertex_group(&self) -> Option<&BindGroup> {
         self.buffers.as_ref().map(|b| &b.vertex_group)
+    }
+
+    /// Prepares what was chosen last to be drawn once more, before it is chosen anew, as seen from
+    /// another origin of render space. Returns the bind group for vertex stages; `None` if nothing
+    /// was chosen, or if instances have moved since.
+    pub fn draw_again(
+        &self,
+        queue: &Queue,
+        geometry: &ClusterGeometry,
+        render_origin: DVec3,
+    ) -> Option<&BindGroup> {
+        let buffers = self.buffers.as_ref()?;
+        (self.placements == geometry.placements).then(|| {
+            let origin = Origin::new(render_origin - geometry.origin);
+            queue.write_buffer(&buffers.origin, 0, bytemuck::bytes_of(&origin));
+            &buffers.vertex_group
+        })
     }
 
     /// Draws one batch of a view, whose batches begin at draw `first`, after you set a pipeline and

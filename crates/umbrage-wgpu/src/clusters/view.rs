@@ -1,5 +1,5 @@
 use super::data;
-use crate::{Error, Redraw};
+use crate::{DepthProjection, Error, Redraw};
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Vec4};
 use umbrage::Plane;
 
@@ -7,6 +7,8 @@ use umbrage::Plane;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClusterView {
     pub(crate) rows: [DVec4; 3],
+    /// The row of depth, times w, in a picture.
+    depth: DVec4,
     /// Width and height, texels or pixels.
     pub(crate) size: DVec2,
     /// Half-spaces around all that counts, in the space of `rows`.
@@ -19,8 +21,8 @@ pub struct ClusterView {
 
 impl ClusterView {
     /// A picture. `pixels_from_render` takes points of render space to pixel coordinates from the
-    /// upper left corner, times w, in its first two rows, and to w in its last; w must be positive
-    /// in the picture, and at least `nearest`. `planes` (render space) are around all that the
+    /// upper left corner, times w, in its first two rows, to its depth, times w, in the third, and to w
+    /// in the last; w must be positive in the picture, and at least `nearest`. `planes` (render space) are around all that the
     /// picture shows. In the picture, no surface is off by more than `share` pixels.
     ///
     /// # Errors
@@ -46,6 +48,7 @@ impl ClusterView {
         }
         Ok(Self {
             rows: [0, 1, 3].map(|i| pixels_from_render.row(i)),
+            depth: pixels_from_render.row(2),
             size: DVec2::from(size.map(f64::from)),
             planes: planes.iter().map(|p| p.normal.extend(p.offset).as_vec4()).collect(),
             nearest: nearest.max(0.0),
@@ -78,12 +81,27 @@ impl ClusterView {
         });
         Self {
             rows: [m.row(0) * size.x, m.row(1) * size.y, w],
+            depth: m.row(2),
             size,
             planes: planes.collect(),
             nearest,
             share,
             is_picture: false,
         }
+    }
+
+    /// The row with which points of render space have their distance along the view, metres; `None`
+    /// if the view has no such projection.
+    pub(crate) fn distance(&self, projection: DepthProjection) -> Option<DVec4> {
+        let w = self.rows[2];
+        let row = if projection.is_orthographic {
+            (w * projection.base - self.depth) / projection.per_nearness
+        } else {
+            w
+        };
+        let length = row.truncate().length();
+        let has_kind = (w.truncate() == DVec3::ZERO) == projection.is_orthographic;
+        (has_kind && length > 0.0 && length.is_finite()).then(|| row / length)
     }
 
     /// The struct that shaders read. Its planes begin at `first_plane`.

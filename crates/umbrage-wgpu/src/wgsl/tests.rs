@@ -157,7 +157,13 @@ fn every_other_module_is_valid() {
             validated(&cluster_vertex(3, layout));
         }
     }
-    for text in [cluster_descent(), cluster_draws(), cluster_indices()] {
+    for text in [
+        cluster_descent(),
+        cluster_draws(),
+        cluster_indices(),
+        cluster_occluders(),
+        cluster_farther(),
+    ] {
         validated(&text);
     }
     validated(include_str!("clear.wesl"));
@@ -315,6 +321,7 @@ fn structs_of_clusters_are_laid_out_alike() {
                 ),
             ),
             of("ShadowClusterDescent", offsets!(ours::Descent, [origin, queue, choices])),
+            of("ShadowClusterOccluders", offsets!(ours::Occluders, [distance, size, levels])),
             of("ShadowClusterItem", offsets!(ours::Item, [view, instance, node])),
             of("ShadowClusterChoice", offsets!(ours::Choice, [instance, cluster, draw, first])),
             of("ShadowClusterOrigin", offsets!(ours::Origin, [high, low])),
@@ -331,6 +338,13 @@ fn structs_of_clusters_are_laid_out_alike() {
             of("ShadowClusterDrawing", offsets!(ours::Drawing, [draws, spans, choices, triangles])),
             of("ShadowClusterSpan", offsets!(ours::Span, [first, count])),
         ],
+    );
+    spans(
+        &cluster_occluders(),
+        &[of(
+            "ShadowClusterPicture",
+            offsets!(ours::Picture, [size, base, per_nearness, is_orthographic, step]),
+        )],
     );
     spans(
         &cluster_indices(),
@@ -404,6 +418,7 @@ fn shaders() -> Vec<Shader> {
         shaders.push(cluster_picture_shader(2, layout));
     }
     shaders.extend([cluster_descent_shader(), cluster_draws_shader(), cluster_indices_shader()]);
+    shaders.extend([cluster_occluders_shader(), cluster_farther_shader()]);
     unlike(shaders.into_iter())
 }
 
