@@ -12,6 +12,7 @@
 //! | a filter for the sun and another for lamps | [`filters_per_light`] |
 //! | maps fitted to what the camera sees | [`fit_to_seen`] |
 //! | to follow the size of a window | [`resizing`] |
+//! | models of millions of triangles, at a cost that follows texels | [`huge_models`] |
 //!
 //! # Hidden fragments
 //!
@@ -146,3 +147,14 @@ pub mod resizing {}
 #[doc = include_str!("../cookbook/fit_to_seen.rs")]
 #[doc = "```"]
 pub mod fit_to_seen {}
+
+/// Static models in levels of detail: each map gets as many of their triangles as its texels can
+/// tell apart, chosen on the device. Where it lacks what this takes ([`Support::clusters`]), draw
+/// with [`MeshCasters`](crate::MeshCasters).
+///
+/// [`Support::clusters`]: crate::Support::clusters
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/huge_models.rs")]
+#[doc = "```"]
+pub mod huge_models {}

@@ -12,6 +12,9 @@
 //!   [`Shadows::depth_stencil_state`] and [`Shadows::primitive_state`] give the states,
 //!   [`Shadows::caster_wgsl`] gives the shader's part, and [`Shadows::caster_fragment`] the
 //!   fragment stage that the device needs.
+//! - [`ClusterCasters`] draws static models of any number of triangles into the maps, as finely as
+//!   the maps' texels can tell; [`ClusterSelection`] and [`ClusterOccluders`] do so for your
+//!   picture.
 //! - [`SeenReadback`] reduces the viewer's depth buffer to what the camera sees, for the planner to
 //!   fit the maps of a later frame to.
 //! - The [`cookbook`] has recipes: casters and shading of your own, several cameras, and others.
@@ -91,4 +94,4 @@ pub use shadows::{
 pub use support::Support;
 
 // Their types are in this API: whoever names them by these paths has the versions that fit.
-pub use {glam, umbrage, wgpu};
+pub use {glam, umbrage, umbrage_clusters, wgpu};

@@ -9,8 +9,8 @@ use wgpu::{BindGroup, CommandEncoder, ComputePassTimestampWrites, Device, Queue}
 ///
 /// # What is right
 /// A caster in a map is off by at most [`share`](Self::share) of the map's own texel at its place,
-/// whatever the map's warp. Give [`ClusterCasters::bias`] to [`Shadows::set_bias`], so that no
-/// coarser caster shadows the finer surface that it stands for.
+/// whatever the map's warp. With [`ClusterCasters::bias`], which [`Shadows::set_bias`] must have
+/// been given, no coarser caster shadows the finer surface that it stands for.
 #[derive(Debug)]
 pub struct ClusterCasters {
     opaque: MeshCasters,
@@ -30,7 +30,8 @@ impl ClusterCasters {
     /// texel by which casters may be off, at least 0; with 0 all casters have all of their detail.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if `share` is negative or not finite.
+    /// [`Error::Invalid`] if `share` is negative or not finite, or if the shadows have less
+    /// [bias](Self::bias) than it takes.
     pub fn new(
         device: &Device,
         shadows: &Shadows,
@@ -41,6 +42,15 @@ impl ClusterCasters {
             return Err(Error::Invalid {
                 field: "share",
                 problem: format!("must be finite and at least 0, is {share}"),
+            });
+        }
+        if shadows.bias().texels < share {
+            return Err(Error::Invalid {
+                field: "bias",
+                problem: format!(
+                    "must have at least {share} texels, which `ClusterCasters::bias` gives, has {}",
+                    shadows.bias().texels
+                ),
             });
         }
         let casters = |kind| {

@@ -9,7 +9,7 @@ use umbrage::{Aabb, Light, Plan, Technique};
 use umbrage_clusters::{ClusterMesh, MeshInput, build};
 use umbrage_testing::needs;
 use umbrage_wgpu::{
-    CasterInstance, Casters, ClusterCasters, ClusterCounts, ClusterGeometry, ClusterInstance,
+    Bias, CasterInstance, Casters, ClusterCasters, ClusterCounts, ClusterGeometry, ClusterInstance,
     ClusterSource, ClusterVertices, Error, Frame, MeshCasters, MeshKind, ShadowOptions, Shadows,
     Timestamps,
 };
@@ -180,7 +180,9 @@ fn draw_whole(
 
 fn shadows(bench: &Bench, technique: &Technique) -> Shadows {
     let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
-    Shadows::new(&bench.device, bench.support, &options).unwrap()
+    let mut shadows = Shadows::new(&bench.device, bench.support, &options).unwrap();
+    shadows.set_bias(ClusterCasters::bias(ClusterCasters::SHARE)).unwrap();
+    shadows
 }
 
 /// Stones of all sizes and orientations, some of them mirrored, some stretched, on the plain.
@@ -442,11 +444,16 @@ fn what_cannot_be_is_refused() {
         other => panic!("{other}"),
     };
     let technique: Technique = "uniform@64".parse().unwrap();
-    let shadows = shadows(&bench, &technique);
+    let mut shadows = shadows(&bench, &technique);
     for share in [f32::NAN, -0.1, f32::INFINITY] {
         let error = ClusterCasters::new(&bench.device, &shadows, &geometry, share).unwrap_err();
         assert_eq!(field(error), "share");
     }
+    // Less bias than coarser casters need.
+    shadows.set_bias(Bias::default()).unwrap();
+    let error = ClusterCasters::new(&bench.device, &shadows, &geometry, 0.5).unwrap_err();
+    assert_eq!(field(error), "bias");
+    assert!(ClusterCasters::new(&bench.device, &shadows, &geometry, 0.0).is_ok());
     let mut other = crowd.instances();
     other[1].mesh = 7;
     assert_eq!(field(geometry.place(&bench.queue, &other).unwrap_err()), "instances");

@@ -11,6 +11,8 @@ mod filter_at_run_time;
 mod filters_per_light;
 #[path = "../../cookbook/fit_to_seen.rs"]
 mod fit_to_seen;
+#[path = "../../cookbook/huge_models.rs"]
+mod huge_models;
 pub(crate) mod kitchen;
 #[path = "../../cookbook/resizing.rs"]
 mod resizing;
@@ -27,7 +29,7 @@ use crate::device::Bench;
 use bytemuck::cast_slice;
 use filter_at_run_time::change_technique;
 use fit_to_seen::SeenShadows;
-use glam::{DVec2, DVec3, Mat4, Vec3, camera::rh};
+use glam::{DAffine3, DVec2, DVec3, Mat4, Vec3, camera::rh};
 use kitchen::{FORMAT, Kitchen, SIZE, box_at, camera, plain};
 use two_cameras::ViewShadows;
 use umbrage::{Aabb, Bounds, BoxTree, Camera, Light, PointLight, Technique};
@@ -130,6 +132,39 @@ fn smooth_normals_are_cured() {
     let tolerant = dark("light_on_smooth_surface(0u, position, smooth_normal)");
     assert!(smooth > 0.01, "smooth normals darken {smooth} of the dome");
     assert!(own < 0.002 && tolerant < 0.002, "own {own}, tolerant {tolerant}");
+}
+
+/// Clusters cast the shadow of the box that they are of, also once it is drawn again.
+#[needs(gpu)]
+#[test]
+fn huge_models_cast_in_levels_of_detail() {
+    let kitchen = Kitchen::new(&[plain(), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let technique = technique("adaptive:pcf2@1024");
+    let mut shadows = shadows(bench, &technique);
+    let place = DVec3::new(1.0, 0.0, -0.5);
+    let model = |positions: Vec<Vec3>, place| huge_models::Model {
+        triangles: (0..positions.len() as u32 / 3).map(|i| [0, 1, 2].map(|k| 3 * i + k)).collect(),
+        positions,
+        world_from_mesh: vec![DAffine3::from_translation(place)],
+    };
+    let models = [model(plain(), DVec3::ZERO), model(box_at(-place), place)];
+    let vertices = models.iter().flat_map(|model| model.positions.iter().copied());
+    let usage = BufferUsages::VERTEX | BufferUsages::STORAGE;
+    let positions = bench.buffer(cast_slice(&vertices.collect::<Vec<_>>()), usage);
+    let (device, support) = (&bench.device, &bench.support);
+    let mut huge =
+        huge_models::HugeModels::new(device, support, &mut shadows, &models, &positions).unwrap();
+    let plan = kitchen.plan(&[SUN], &technique);
+    for casters in [Casters::Unmoved, Casters::Moved] {
+        let frame = Frame { plan: &plan, render_origin: DVec3::ZERO, casters };
+        let mut encoder = bench.encoder();
+        huge.draw(device, &bench.queue, &mut encoder, &mut shadows, &frame).unwrap();
+        bench.finish(encoder);
+        let picture = kitchen.forward(&shadows, &kitchen::shader("shadow_visibility"), &camera());
+        kitchen
+            .check(&picture, &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
+    }
 }
 
 #[needs(gpu)]
