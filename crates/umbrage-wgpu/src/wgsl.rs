@@ -455,7 +455,7 @@ fn cluster_picture_shader(group: u32, layout: AttributeLayout) -> Shader {
 
 fn cluster_vertex_shader(group: u32, layout: AttributeLayout) -> Shader {
     let mut shader = Shader::new(module!("cluster_vertex"));
-    shader.add([module!("cluster_instance")]);
+    shader.add([module!("cluster_instance"), module!("cluster_types")]);
     shader.constant("SHADOW_CLUSTER_BINDINGS", group);
     shader.constant("SHADOW_CLUSTER_STRIDE", layout.stride);
     shader

@@ -33,7 +33,8 @@ pub(crate) struct Cluster {
     pub(crate) first_vertex: u32,
     pub(crate) first_triangle: u32,
     pub(crate) triangle_count: u32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) vertex_count: u32,
+    pub(crate) padding: [u32; 2],
 }
 
 /// `ShadowClusterInstance`.
@@ -109,6 +110,7 @@ pub(crate) struct Choice {
     pub(crate) cluster: u32,
     pub(crate) draw: u32,
     pub(crate) first: u32,
+    pub(crate) block: u32,
 }
 
 /// `ShadowClusterDrawing`.
@@ -127,6 +129,7 @@ pub(crate) struct Drawing {
 pub(crate) struct Indexing {
     pub(crate) choices: u32,
     pub(crate) triangles: u32,
+    pub(crate) blocks: u32,
 }
 
 /// `ShadowClusterSpan`.
@@ -161,6 +164,7 @@ pub(crate) struct Picture {
 /// The places in the buffer of counts, as in `wgsl/cluster_types.wesl`.
 pub(crate) const CHOSEN: usize = 32;
 pub(crate) const TRIANGLES: usize = 33;
+pub(crate) const BLOCKS: usize = 34;
 pub(crate) const DRAWS: usize = 40;
 
 /// A point in two parts, which together hold it in double precision almost.
@@ -207,7 +211,8 @@ impl Lists {
             first_vertex: own_vertices + cluster.first_vertex,
             first_triangle: own_triangles + cluster.first_triangle,
             triangle_count: cluster.triangle_count,
-            padding: [0; 3],
+            vertex_count: cluster.vertex_count,
+            padding: [0; 2],
         }));
         vertices.extend(mesh.vertices.iter().map(|v| first_vertex + v));
         triangles.extend_from_slice(&mesh.triangles);

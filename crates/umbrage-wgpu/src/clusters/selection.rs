@@ -19,8 +19,8 @@ use wgpu::{
 const MAX_ROUNDS: usize = data::CHOSEN - 1;
 /// Items of a queue that workgroups can be started for.
 const MAX_QUEUE: u64 = 65_535 * 64;
-/// Places of chosen clusters that an index has room for.
-const MAX_CHOICES: u64 = 1 << 25;
+/// Blocks of vertices that 24 bits have indices for.
+const MAX_BLOCKS: u64 = 1 << 20;
 /// The factor by which more error is allowed where the device has no room for what is chosen.
 const RELIEF: f32 = 1.5;
 /// The error, texels or pixels, that relief begins at where none is allowed, of which no factor is
@@ -67,6 +67,8 @@ struct Room {
     queue: u32,
     choices: u32,
     triangles: u32,
+    /// Of 16 vertices each.
+    blocks: u32,
 }
 
 #[derive(Debug)]
@@ -140,10 +142,12 @@ impl ClusterSelection {
         let most = |size: u64, most: u64| (bytes / size).min(most) as u32;
         let most = Room {
             queue: most(size_of::<Item>() as u64, MAX_QUEUE),
-            choices: most(size_of::<data::Choice>() as u64, MAX_CHOICES),
+            choices: most(size_of::<data::Choice>() as u64, u64::from(u32::MAX)),
             triangles: most(12, u64::from(u32::MAX) / 12),
+            blocks: most(16, MAX_BLOCKS),
         };
-        let room = Room { queue: 1 << 16, choices: triangles / 32, triangles }.within(most);
+        let blocks = triangles / 16;
+        let room = Room { queue: 1 << 16, choices: triangles / 32, triangles, blocks }.within(most);
         Self {
             room,
             most,
@@ -352,9 +356,11 @@ impl ClusterSelection {
                         let queue = words[..data::CHOSEN].iter().copied().max().unwrap_or(0);
                         let chosen = words[data::CHOSEN];
                         let triangles = words[data::TRIANGLES];
+                        let blocks = words[data::BLOCKS];
                         let is_complete = queue <= room.queue
                             && chosen <= room.choices
-                            && triangles <= room.triangles;
+                            && triangles <= room.triangles
+                            && blocks <= room.blocks;
                         self.counted = number;
                         self.counts = ClusterCounts {
                             triangles: u64::from(triangles),
@@ -371,6 +377,7 @@ impl ClusterSelection {
                             queue: grown(self.room.queue, queue),
                             choices: grown(self.room.choices, chosen),
                             triangles: grown(self.room.triangles, triangles),
+                            blocks: grown(self.room.blocks, blocks),
                         }
                         .within(self.most);
                         if !is_complete && grown == self.room && relief == self.relief {
@@ -413,6 +420,7 @@ impl Room {
             queue: self.queue.min(most.queue),
             choices: self.choices.min(most.choices),
             triangles: self.triangles.min(most.triangles),
+            blocks: self.blocks.min(most.blocks),
         }
     }
 }
@@ -469,7 +477,7 @@ impl Buffers {
         let drawing = uniform(size_of::<Drawing>());
         let indexing = buffer(
             device,
-            &[Indexing { choices: room.choices, triangles: room.triangles }, Indexing::default()],
+            &[Indexing { choices: room.choices, triangles: room.triangles, blocks: room.blocks }],
             BufferUsages::UNIFORM,
         );
         let queues =
@@ -481,7 +489,7 @@ impl Buffers {
         let index_groups = of_size(12, indirect);
         let no_groups = of_size(((GROUP_WORDS + 1) * 4) as u64, BufferUsages::COPY_SRC);
         let choices = of_size(u64::from(room.choices) * size_of::<data::Choice>() as u64, STORED);
-        let drawn = of_size(u64::from(room.choices) * 16, STORED);
+        let drawn = of_size(u64::from(room.blocks) * 16, STORED);
         let draws = of_size(room_for(sizes.draws, 20), indirect);
         let firsts = of_size(room_for(sizes.draws + 1, 4), STORED);
         let indices = of_size(u64::from(room.triangles) * 12, STORED | BufferUsages::INDEX);

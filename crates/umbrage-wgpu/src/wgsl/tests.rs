@@ -299,7 +299,7 @@ fn structs_of_clusters_are_laid_out_alike() {
         &cluster_descent(),
         &[
             ("ShadowClusterNode", &[0, 12, 16, 20, 24, 28], size_of::<ours::Node>()),
-            ("ShadowCluster", &[0, 12, 16, 28, 32, 36, 40, 44, 48], size_of::<ours::Cluster>()),
+            ("ShadowCluster", &[0, 12, 16, 28, 32, 36, 40, 44, 48, 52], size_of::<ours::Cluster>()),
             of(
                 "ShadowClusterView",
                 offsets!(
@@ -323,7 +323,10 @@ fn structs_of_clusters_are_laid_out_alike() {
             of("ShadowClusterDescent", offsets!(ours::Descent, [origin, queue, choices])),
             of("ShadowClusterOccluders", offsets!(ours::Occluders, [distance, size, levels])),
             of("ShadowClusterItem", offsets!(ours::Item, [view, instance, node])),
-            of("ShadowClusterChoice", offsets!(ours::Choice, [instance, cluster, draw, first])),
+            of(
+                "ShadowClusterChoice",
+                offsets!(ours::Choice, [instance, cluster, draw, first, block]),
+            ),
             of("ShadowClusterOrigin", offsets!(ours::Origin, [high, low])),
             (
                 "ShadowClusterInstance",
@@ -348,7 +351,7 @@ fn structs_of_clusters_are_laid_out_alike() {
     );
     spans(
         &cluster_indices(),
-        &[of("ShadowClusterIndexing", offsets!(ours::Indexing, [choices, triangles]))],
+        &[of("ShadowClusterIndexing", offsets!(ours::Indexing, [choices, triangles, blocks]))],
     );
 }
 
