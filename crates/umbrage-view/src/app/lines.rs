@@ -262,7 +262,9 @@ fn paint_scale(
     let steps = width as usize;
     for i in 0..steps {
         let share = i as f32 / (steps - 1) as f32;
-        let stripe = Rect::from_min_size(bar.min + vec2(i as f32, 0.0), vec2(1.5, bar.height()));
+        // Each stripe lies over the rest of the one before, so that its soft edge does not show
+        // what is below the scale.
+        let stripe = Rect::from_min_max(bar.min + vec2(i as f32, 0.0), bar.max);
         painter.rect_filled(stripe, 0.0, color(color_at(share)));
     }
     for (label, share) in labels {
