@@ -267,8 +267,8 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// Returns the cluster of triangles in the middle of each pixel of some rows; `None` in the sky,
-    /// and everywhere by the reference, which has no clusters.
+    /// Returns the cluster of triangles in the middle of each pixel of some rows, as frames to look
+    /// at are drawn; `None` in the sky, and everywhere by the reference, which has no clusters.
     ///
     /// # Errors
     /// An error if a GPU fails.

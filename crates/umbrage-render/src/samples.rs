@@ -1,6 +1,6 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
-use crate::clusters::SAMPLE_SHARE_PX;
+use crate::clusters::{FRAME_SHARE_PX, SAMPLE_SHARE_PX};
 use crate::renderer::{Drawn, Pipelines, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
@@ -64,9 +64,9 @@ impl Renderer<'_> {
         grid: u32,
         wants_texels: bool,
     ) -> Result<Vec<Sample>, Error> {
-        let mut passes = vec![self.pass("picture", 2)];
+        let mut passes = vec![self.pass("picture", 2, SAMPLE_SHARE_PX)];
         if wants_texels {
-            passes.push(self.pass("texels", 1));
+            passes.push(self.pass("texels", 1, SAMPLE_SHARE_PX));
         }
         let no_texel = Vec4::new(0.0, 0.0, -1.0, 0.0);
         let sample = |layers: &[Vec4]| {
@@ -76,8 +76,9 @@ impl Renderer<'_> {
     }
 
     /// The cluster in the middle of each pixel of some of a picture's rows, row by row from the
-    /// left; `None` in the sky. These are the clusters that [`samples`](Self::samples) are of.
-    /// Where [no clusters are drawn](Self::draws_clusters), all surfaces are one of level 0.
+    /// left; `None` in the sky. These are the clusters that [frames](Self::frame) are drawn of;
+    /// [`samples`](Self::samples) may be of finer ones. Where
+    /// [no clusters are drawn](Self::draws_clusters), all surfaces are one of level 0.
     ///
     /// # Errors
     /// The device refused something or was lost.
@@ -86,7 +87,7 @@ impl Renderer<'_> {
         shading: &Shading<'_>,
         rows: Range<u32>,
     ) -> Result<Vec<Option<SeenCluster>>, Error> {
-        let passes = [self.pass("clusters", 1)];
+        let passes = [self.pass("clusters", 1, FRAME_SHARE_PX)];
         let seen = |layers: &[Vec4]| {
             let [number, level] = [layers[0].x, layers[0].y];
             (level >= 0.0).then_some(SeenCluster { number: number as u32, level: level as u32 })
@@ -95,8 +96,9 @@ impl Renderer<'_> {
     }
 
     /// The pass with the fragment shaders of this name, which write so many textures.
-    fn pass(&mut self, name: &'static str, textures: usize) -> Pass {
-        Pass { pipelines: self.pipelines(name, &vec![SAMPLE_FORMAT; textures]), textures }
+    fn pass(&mut self, name: &'static str, textures: usize, share_px: f32) -> Pass {
+        let pipelines = self.pipelines(name, &vec![SAMPLE_FORMAT; textures]);
+        Pass { pipelines, textures, share_px }
     }
 
     /// Draws passes of samples, and makes a value of what they write for each.
@@ -136,6 +138,8 @@ struct Pass {
     pipelines: Pipelines,
     /// The number of textures that it writes.
     textures: usize,
+    /// How far clusters may be off, pixels.
+    share_px: f32,
 }
 
 impl Sample {
@@ -219,15 +223,15 @@ impl Layers {
         // A tile at the edge of the picture is drawn into a corner of the textures.
         let device = renderer.gpu.device();
         let full = Tile { size: [self.depth.width(), self.depth.height()], ..*tile };
-        let (depth_store, share_px) = (StoreOp::Discard, SAMPLE_SHARE_PX);
+        let depth_store = StoreOp::Discard;
         loop {
             let mut encoder = device.create_command_encoder(&Default::default());
             let mut layers = 0..;
-            for Pass { pipelines, textures } in passes {
-                let color = &color[..*textures];
+            for &Pass { ref pipelines, textures, share_px } in passes {
+                let color = &color[..textures];
                 let target = Target { color, depth: &depth, depth_store, share_px, pipelines };
                 renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-                for (texture, layer) in self.color[..*textures].iter().zip(&mut layers) {
+                for (texture, layer) in self.color[..textures].iter().zip(&mut layers) {
                     self.copy(&mut encoder, texture, layer);
                 }
             }
