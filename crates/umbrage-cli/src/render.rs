@@ -59,7 +59,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     let needs = Needs::of(&pictures);
     ensure!(
         !needs.clusters || render_scene.on_gpu().is_some_and(|(_, scene)| scene.has_clusters()),
-        "--aov: clusters are drawn by a GPU with compute shaders and room for them; here renders {}",
+        "--aov: only a GPU with compute shaders and room for them draws clusters; here renders {}",
         executors.choice()
     );
     let tracer = render_scene.tracer();

@@ -29,8 +29,8 @@ pub fn with_legend(picture: Image<Rgb>, scale: ErrorScale) -> Image<Rgb> {
     Legend { title: "pixels per texel", color, labels }.draw(picture)
 }
 
-/// Draws the colours of levels of detail into the upper left corner of a map of clusters, if there is
-/// room for it as for [`with_legend`].
+/// Draws the colours of levels of detail into the upper left corner of a map of clusters, if there
+/// is room for it as for [`with_legend`].
 pub fn with_level_legend(picture: Image<Rgb>) -> Image<Rgb> {
     let label = |level: usize| ((level as f32 + 0.5) / LEVELS as f32 * 100.0, level.to_string());
     let labels = (0..LEVELS).step_by(3).map(label).collect();

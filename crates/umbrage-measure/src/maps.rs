@@ -105,8 +105,8 @@ pub fn cluster_map(
     })
 }
 
-/// A tint with the lightness of the picture below, so that the shading stays visible; without a tint
-/// the picture is dimmed.
+/// A tint with the lightness of the picture below, so that the shading stays visible; without a
+/// tint the picture is dimmed.
 fn tinted(below: Rgb, tint: Option<Rgb>) -> Rgb {
     match tint {
         Some(tint) => mix([0; 3], tint, 0.25 + 0.75 * luma(below) / 255.0),

@@ -76,8 +76,9 @@ pub(crate) enum Aov {
     /// against supersampled truth. EXR: the mean change of a pixel's error from frame to frame, NaN
     /// where pixels show more than one surface.
     Minification,
-    /// The clusters of triangles that a GPU draws frames of, tinted by their level of detail. Scenes
-    /// of any size are then drawn as clusters. EXR: level and number of the cluster, −1 in the sky.
+    /// The clusters of triangles that a GPU draws frames of, tinted by their level of detail.
+    /// Scenes of any size are then drawn as clusters. EXR: level and number of the cluster, −1 in
+    /// the sky.
     Clusters,
 }
 

@@ -159,7 +159,7 @@ fn clusters_are_shown_where_they_are_drawn() {
     for (options, expected) in [
         ("--full-detail", "--full-detail: leave it out for --aov clusters"),
         ("--backend reference", "--backend: --aov clusters shows what a GPU draws; take gpu"),
-        ("--shadows log", "--aov: clusters are drawn by a GPU"),
+        ("--shadows log", "--aov: only a GPU with compute shaders"),
     ] {
         let args = format!("render pole -o p.png --aov color,clusters {options}");
         refuses(&desk, &words(&args), expected);

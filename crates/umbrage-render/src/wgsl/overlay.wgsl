@@ -1,5 +1,6 @@
-// Frames that show what the maps do or what was drawn, over the picture or in its place. The text of `forward.wgsl`
-// must precede this one. Colours are mixed by their sRGB values, as the pictures of reports are.
+// Frames that show what the maps do or what was drawn, over the picture or in its place. The text
+// of `forward.wgsl` must precede this one. Colours are mixed by their sRGB values, as the pictures
+// of reports are.
 
 struct Overlay {
     // ERROR, GRID, PARTITION or CLUSTERS.

@@ -243,8 +243,8 @@ fn paint_levels(painter: &Painter, rect: Rect) {
     paint_scale(painter, rect, "level of detail, 0 the finest", level_scale, &labels);
 }
 
-/// Draws a scale of colours into the lower left corner of a picture: the colour at each share of its
-/// length, and labels at some shares.
+/// Draws a scale of colours into the lower left corner of a picture: the colour at each share of
+/// its length, and labels at some shares.
 fn paint_scale(
     painter: &Painter,
     rect: Rect,
