@@ -4,15 +4,15 @@ use crate::args::{self, Aov, PictureArgs, PictureKind};
 use crate::output::note;
 use crate::progress::Bar;
 use crate::setup::{Chosen, announce, choose, open_changed, tell_chosen, tell_notices};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
     Certainty, Detail, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers,
     RenderScene, Rows, Shadowed, Shape, Texels, check_file, noise, plan, plan_fading,
 };
 use umbrage_measure::{
-    ErrorScale, Image, Rgb, difference_map, error_map, grey, noise_map, partition_map, texel_map,
-    with_legend, write_exr, write_png,
+    ErrorScale, Image, Rgb, cluster_map, difference_map, error_map, grey, noise_map, partition_map,
+    texel_map, with_legend, with_level_legend, write_exr, write_png,
 };
 use umbrage_trace::{AreaLight, View, shade};
 
@@ -25,6 +25,8 @@ struct Data {
     texels: Texels,
     shape: Shape,
     noise: Vec<f32>,
+    /// Number and level of detail of the cluster in the middle of each pixel.
+    clusters: Vec<Option<[u32; 2]>>,
     certainty: Certainty,
 }
 
@@ -34,6 +36,7 @@ struct Needs {
     truth: bool,
     maps: bool,
     motion: bool,
+    clusters: bool,
 }
 
 /// Number of frames of the motion that measures minification.
@@ -51,8 +54,14 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     bar.stage("preparing the scene");
     let backend = args.execution.backend.into();
     let executors = Executors::open(backend, std::slice::from_ref(&args.shadows))?;
-    let detail = Detail::new(&scene, &executors, &args.execution.detail(), &bar)?;
+    let detail = Detail::new(&scene, &executors, &args.detail(), &bar)?;
     let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque, &detail)?;
+    let needs = Needs::of(&pictures);
+    ensure!(
+        !needs.clusters || render_scene.on_gpu().is_some_and(|(_, scene)| scene.has_clusters()),
+        "--aov: only a GPU with compute shaders and room for them draws clusters; here renders {}",
+        executors.choice()
+    );
     let tracer = render_scene.tracer();
     let view = View::new(tracer, chosen.camera, light, args.samples).context("--samples")?;
     if let Some(size) = args.light_size {
@@ -68,7 +77,6 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
         _ => plan,
     };
     let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
-    let needs = Needs::of(&pictures);
     if needs.motion {
         Motion::Away.check(FRAMES, &chosen, light)?;
     }
@@ -126,6 +134,7 @@ impl Needs {
             truth: any(Aov::shows_truth),
             maps: any(|aov| !matches!(aov, Aov::Truth | Aov::Depth | Aov::Normal)),
             motion: any(|aov| aov == Aov::Minification),
+            clusters: any(|aov| aov == Aov::Clusters),
         }
     }
 
@@ -179,6 +188,10 @@ impl Data {
                 data.texels.push(strip);
             }
             data.shape.push(strip.as_ref().unwrap_or(shape));
+            if needs.clusters {
+                let clusters = executor.clusters(&rows)?.into_iter();
+                data.clusters.extend(clusters.map(|seen| seen.map(|c| [c.number, c.level])));
+            }
         }
         Ok(data)
     }
@@ -220,6 +233,10 @@ impl Data {
                 &Image::new(size, self.texels.map.clone())?,
                 &rgb(self.technique.color.clone())?,
             )?,
+            Aov::Clusters => with_level_legend(cluster_map(
+                &Image::new(size, self.clusters.clone())?,
+                &rgb(self.technique.color.clone())?,
+            )?),
             Aov::Minification => noise_map(
                 &Image::new(size, self.noise.clone())?,
                 &rgb(self.technique.color.clone())?,
@@ -245,6 +262,12 @@ impl Data {
             Aov::Color => color(self.shape.radiance.clone()),
             Aov::Normal => color(self.shape.normal.iter().map(glam::Vec3::to_array).collect()),
             Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
+            Aov::Clusters => {
+                let values = |seen: &Option<[u32; 2]>| {
+                    seen.map_or([-1.0; 3], |[number, level]| [level as f32, number as f32, 0.0])
+                };
+                color(self.clusters.iter().map(values).collect())
+            }
             Aov::Visibility => plane(self.technique.visibility.clone()),
             Aov::Truth => plane(self.truth.visibility.clone()),
             Aov::Difference => {

@@ -8,9 +8,11 @@ use crate::strip::{Rows, Strip};
 use glam::DVec3;
 use rayon::prelude::*;
 use umbrage::{Camera, Light, Plan, SeenTiles, Technique};
-use umbrage_render::{EdgeOn, FrameTarget, Gpu, Renderer, SceneBuffers, Shading, Timer};
+use umbrage_render::{
+    EdgeOn, FrameTarget, Gpu, Renderer, SceneBuffers, SeenCluster, Shading, Timer,
+};
 use umbrage_scene::Scene;
-use umbrage_trace::{Progress, Reference, Sample, Tracer};
+use umbrage_trace::{Progress, Reference, Sample, Tracer, View};
 use umbrage_wgpu::{Casters, LookupBuffers, SeenReadback, ShadowOptions};
 
 /// A scene that is ready to be rendered, by rays on the CPU and, if there is one, on a GPU.
@@ -172,10 +174,15 @@ impl OnGpu<'_> {
     /// Returns rows of a picture. Texels are only computed if `wants_texels` is true.
     fn strip(&mut self, rows: &Rows<'_>, wants_texels: bool) -> Result<Strip, Error> {
         let view = rows.view();
-        let shading = Shading { camera: view.camera(), light: view.light(), light_index: 0 };
-        let samples = self.renderer.samples(&shading, rows.range(), view.grid(), wants_texels)?;
+        let (rows, grid) = (rows.range(), view.grid());
+        let samples = self.renderer.samples(&shading(view), rows, grid, wants_texels)?;
         Ok(Strip::of_gpu(&samples, view))
     }
+}
+
+/// What a GPU shades the picture of a view with.
+fn shading<'a>(view: &'a View<'_>) -> Shading<'a> {
+    Shading { camera: view.camera(), light: view.light(), light_index: 0 }
 }
 
 /// Returns the triangles that a plan's lamps lie in, which must be
@@ -257,6 +264,21 @@ impl<'a> Executor<'a> {
             // A renderer that has drawn no maps lets all light through.
             Work::Gpu(on) => on.strip(rows, false),
             Work::Reference { .. } => Ok(rows.in_full_light()),
+        }
+    }
+
+    /// Returns the cluster of triangles in the middle of each pixel of some rows, as frames to look
+    /// at are drawn; `None` in the sky, and everywhere by the reference, which has no clusters.
+    ///
+    /// # Errors
+    /// An error if a GPU fails.
+    pub fn clusters(&mut self, rows: &Rows<'_>) -> Result<Vec<Option<SeenCluster>>, Error> {
+        let view = rows.view();
+        match &mut self.work {
+            Work::Gpu(on) => Ok(on.renderer.seen_clusters(&shading(view), rows.range())?),
+            Work::Reference { .. } => {
+                Ok(vec![None; rows.range().len() * view.camera().image()[0] as usize])
+            }
         }
     }
 

@@ -19,6 +19,40 @@ pub const PARTITIONS: [Rgb; 7] = [
     [0, 114, 178],
 ];
 
+/// Number of colours for levels of detail.
+pub const LEVELS: usize = 16;
+
+/// The colours of levels of detail; levels beyond have the last. From red for the finest through
+/// yellow, green and blue to magenta, in equal steps of colour (by arc length in OKLab).
+pub static LEVEL_COLORS: LazyLock<[Rgb; LEVELS]> = LazyLock::new(|| {
+    // Lightness, chroma, and hue in degrees (OKLCh).
+    let stops = [
+        [0.64, 0.20, 27.0],
+        [0.75, 0.16, 60.0],
+        [0.88, 0.17, 98.0],
+        [0.78, 0.19, 142.0],
+        [0.81, 0.12, 200.0],
+        [0.62, 0.17, 255.0],
+        [0.54, 0.21, 300.0],
+        [0.68, 0.24, 335.0],
+    ];
+    let stops = stops.map(oklab_from_oklch);
+    std::array::from_fn(|level| srgb_from_oklab(along(&stops, level as f32 / (LEVELS - 1) as f32)))
+});
+
+/// The colour at a share of the length of a scale of all levels of detail.
+pub fn level_scale(share: f32) -> Rgb {
+    LEVEL_COLORS[((share * LEVELS as f32) as usize).min(LEVELS - 1)]
+}
+
+/// The colour of a cluster of triangles: that of its level of detail, a little darker by its
+/// number, so that neighbours can be told apart.
+pub fn cluster_color(number: u32, level: u32) -> Rgb {
+    // Fibonacci hashing (Knuth 1973), as in the overlays of `umbrage-render`.
+    let hash = (number.wrapping_mul(2_654_435_769) >> 24) as f32 / 255.0;
+    mix([0; 3], LEVEL_COLORS[(level as usize).min(LEVELS - 1)], 1.0 - 0.25 * hash)
+}
+
 /// A scale of colours for pixels per texel, logarithmic from 1/max to max.
 ///
 /// The scale diverges from 1, where a texel is as large as a pixel and the colour is a pale
@@ -234,6 +268,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn levels_of_detail_stay_apart() {
+        let lab = |level: usize| oklab(linear(LEVEL_COLORS[level]));
+        let steps: Vec<f32> = (1..LEVELS).map(|i| distance(lab(i - 1), lab(i))).collect();
+        let mean = steps.iter().sum::<f32>() / steps.len() as f32;
+        assert!(mean > 0.06, "{mean}");
+        assert!(steps.iter().all(|s| (s / mean - 1.0).abs() < 0.3), "{mean} {steps:?}");
+        assert_eq!(cluster_color(0, 3), LEVEL_COLORS[3]);
+        assert_eq!(cluster_color(0, u32::MAX), LEVEL_COLORS[LEVELS - 1]);
+        // A cluster is darker by its number, and never as dark as to look like another level.
+        for number in 1..1000 {
+            let darker = cluster_color(number, 0);
+            assert!((0..3).all(|c| darker[c] <= LEVEL_COLORS[0][c]), "{darker:?}");
+            assert!(darker[0] as f32 >= 0.74 * f32::from(LEVEL_COLORS[0][0]), "{darker:?}");
+        }
+        assert_ne!(cluster_color(1, 0), cluster_color(2, 0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Pictures made of measurements: where visibility is wrong, how large the error is, which map
-//! serves a pixel, and where texels lie.
+//! serves a pixel, where texels lie, and which clusters of triangles are drawn.
 
-use crate::color::{FALSE_LIGHT, FALSE_SHADOW, PARTITIONS, mix};
+use crate::color::{FALSE_LIGHT, FALSE_SHADOW, PARTITIONS, cluster_color, mix};
 use crate::metrics::check_visibilities;
 use crate::{Error, ErrorScale, Image, Rgb};
 
@@ -84,13 +84,34 @@ pub fn partition_map(
 ) -> Result<Image<Rgb>, Error> {
     picture.check_like(map_index, "picture")?;
     Image::from_fn(map_index.size(), |x, y| {
-        let below = *picture.at(x, y);
-        map_index.at(x, y).map_or(dimmed(below, false), |i| {
-            let tint = PARTITIONS[usize::from(i) % PARTITIONS.len()];
-            // The tint takes the lightness of the picture, so that the shading stays visible.
-            mix([0; 3], tint, 0.25 + 0.75 * luma(below) / 255.0)
-        })
+        let color = map_index.at(x, y).map(|i| PARTITIONS[usize::from(i) % PARTITIONS.len()]);
+        tinted(*picture.at(x, y), color)
     })
+}
+
+/// The cluster of triangles that each pixel shows, by its number and its level of detail: the
+/// `picture`, tinted by [`cluster_color`]. Pixels with `None`, which show the sky, are only dimmed.
+///
+/// # Errors
+/// The sizes differ.
+pub fn cluster_map(
+    clusters: &Image<Option<[u32; 2]>>,
+    picture: &Image<Rgb>,
+) -> Result<Image<Rgb>, Error> {
+    picture.check_like(clusters, "picture")?;
+    Image::from_fn(clusters.size(), |x, y| {
+        let color = clusters.at(x, y).map(|[number, level]| cluster_color(number, level));
+        tinted(*picture.at(x, y), color)
+    })
+}
+
+/// A tint with the lightness of the picture below, so that the shading stays visible; without a
+/// tint the picture is dimmed.
+fn tinted(below: Rgb, tint: Option<Rgb>) -> Rgb {
+    match tint {
+        Some(tint) => mix([0; 3], tint, 0.25 + 0.75 * luma(below) / 255.0),
+        None => dimmed(below, false),
+    }
 }
 
 /// The texels of a map as they lie on the surfaces: a line every 5 texels over the `picture` (Lloyd
@@ -158,6 +179,7 @@ pub(crate) fn luma([r, g, b]: Rgb) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::LEVEL_COLORS;
 
     fn image<T: Clone>(size: [u32; 2], pixels: &[T]) -> Image<T> {
         Image::new(size, pixels.to_vec()).unwrap()
@@ -190,6 +212,13 @@ mod tests {
         let index = image([3, 1], &[Some(0), Some(PARTITIONS.len() as u16), None]);
         let map = partition_map(&index, &image([3, 1], &[[255; 3]; 3])).unwrap();
         assert_eq!(map.pixels(), [PARTITIONS[0], PARTITIONS[0], [65; 3]]);
+    }
+
+    #[test]
+    fn clusters_have_the_colours_of_their_levels() {
+        let clusters = image([3, 1], &[Some([0, 2]), Some([7, 2]), None]);
+        let map = cluster_map(&clusters, &image([3, 1], &[[255; 3]; 3])).unwrap();
+        assert_eq!(map.pixels(), [LEVEL_COLORS[2], cluster_color(7, 2), [65; 3]]);
     }
 
     #[test]

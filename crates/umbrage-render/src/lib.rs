@@ -27,9 +27,9 @@ pub use error::Error;
 pub use frame_target::{FRAME_FORMAT, FrameTarget};
 pub use gpu::{AdapterReport, Gpu, devices};
 pub use instances::EdgeOn;
-pub use overlay::{Overlay, PARTITION_COLORS, SCALE_COLORS};
+pub use overlay::{LEVEL_COLORS, Overlay, PARTITION_COLORS, SCALE_COLORS};
 pub use renderer::{Drawn, Renderer, Shading};
-pub use samples::Sample;
+pub use samples::{Sample, SeenCluster};
 pub use scene::SceneBuffers;
 pub use timer::{Stage, StageTimes, Timer};
 

@@ -1,4 +1,4 @@
-//! Frames that show what the maps do, over the picture or in its place.
+//! Frames that show what the maps do or what was drawn, over the picture or in its place.
 
 use crate::renderer::Renderer;
 use crate::{Drawn, Error, FrameTarget, Shading, Timer};
@@ -7,10 +7,10 @@ use bytemuck::{Pod, Zeroable};
 /// Number of colours on a scale of errors, from 1/max to max.
 pub const SCALE_COLORS: usize = 65;
 
-/// What a frame shows of the maps. All colours are sRGB.
+/// What a frame shows of the maps, or of the clusters. All colours are sRGB.
 ///
-/// Surfaces that no map serves or holds are hatched by [`Error`](Self::Error), and dimmed by the
-/// others. The sky is always dimmed.
+/// Surfaces that no map serves or holds are hatched by [`Error`](Self::Error), and dimmed by
+/// [`Grid`](Self::Grid) and [`Partition`](Self::Partition). The sky is always dimmed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Overlay<'a> {
     /// Pixels per texel on the surface, in the worst direction, in place of the picture. Surfaces
@@ -33,10 +33,20 @@ pub enum Overlay<'a> {
         /// The colours of the maps, which repeat.
         colors: &'a [[u8; 3]; PARTITION_COLORS],
     },
+    /// The clusters of triangles that are drawn: the picture's lightness, tinted by the cluster's
+    /// level of detail, and a little darker by its number. Where no clusters are drawn, all
+    /// surfaces have level 0.
+    Clusters {
+        /// The colours of the levels; coarser ones have the last.
+        colors: &'a [[u8; 3]; LEVEL_COLORS],
+    },
 }
 
 /// Number of colours for maps, after which they repeat, as in `wgsl/overlay.wgsl`.
 pub const PARTITION_COLORS: usize = 7;
+
+/// Number of colours for levels of detail, as in `wgsl/overlay.wgsl`.
+pub const LEVEL_COLORS: usize = 16;
 
 /// The struct `Overlay` of `wgsl/overlay.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -55,6 +65,7 @@ impl OverlayUniform {
             Overlay::Error { colors, max } => (0, colors.as_slice(), *max),
             Overlay::Grid { color } => (1, std::slice::from_ref(color), f32::MAX),
             Overlay::Partition { colors } => (2, colors.as_slice(), f32::MAX),
+            Overlay::Clusters { colors } => (3, colors.as_slice(), f32::MAX),
         };
         if matches!(overlay, Overlay::Error { .. }) && !(max > 1.0 && max <= 1e6) {
             return Err(Error::Invalid {

@@ -1,4 +1,4 @@
-use crate::clusters::{ClusterDrawing, FRAME_SHARE_PX, SAMPLE_SHARE_PX, picture_view};
+use crate::clusters::{ClusterDrawing, FRAME_SHARE_PX, picture_view};
 use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::map_picture::MapPicture;
@@ -410,7 +410,8 @@ impl<'g> Renderer<'g> {
         let pipelines = self.pipelines(name, &[FRAME_FORMAT]);
         let color = &[&target.color_view][..];
         let (depth, depth_store) = (&target.depth, StoreOp::Store);
-        let parts = Target { color, depth, depth_store, is_frame: true, pipelines: &pipelines };
+        let (share_px, is_frame) = (FRAME_SHARE_PX, true);
+        let parts = Target { color, depth, depth_store, share_px, is_frame, pipelines: &pipelines };
         loop {
             let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
             let timer = timer.as_deref_mut();
@@ -485,8 +486,7 @@ impl<'g> Renderer<'g> {
         if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
             let choice = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
             let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
-            let share_px = if target.is_frame { FRAME_SHARE_PX } else { SAMPLE_SHARE_PX };
-            let view = picture_view(camera, tile, &view, &planes, share_px)?;
+            let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
             let (device, queue) = (gpu.device(), gpu.queue());
             let ClusterDrawing { picture, occluders, depths, .. } = drawing;
             let (geometry, eye) = (&own.geometry, camera.eye());
@@ -658,7 +658,9 @@ pub(crate) struct Target<'a> {
     pub(crate) depth: &'a TextureView,
     /// Whether depths are kept for later passes.
     pub(crate) depth_store: StoreOp,
-    /// Whether the picture is to be looked at, and follows another one. Others are measured.
+    /// How far clusters may be off, pixels.
+    pub(crate) share_px: f32,
+    /// Whether the picture follows another one, which it resembles.
     pub(crate) is_frame: bool,
     pub(crate) pipelines: &'a Pipelines,
 }

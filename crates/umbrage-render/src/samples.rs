@@ -1,5 +1,6 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
+use crate::clusters::{FRAME_SHARE_PX, SAMPLE_SHARE_PX};
 use crate::renderer::{Drawn, Pipelines, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
@@ -9,11 +10,11 @@ use umbrage_wgpu::DEPTH_FORMAT;
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder, Extent3d,
     StoreOp, TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor,
-    TextureDimension, TextureFormat, TextureUsages, TextureViewDescriptor,
+    TextureDimension, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
 };
 
 /// The values of the GPU at a point of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Linear colour.
     pub radiance: Vec3,
@@ -32,6 +33,15 @@ pub struct Sample {
     pub texel: Vec2,
     /// Pixels per texel on the surface, in the worst direction; NaN without a map.
     pub error: f32,
+}
+
+/// A cluster of triangles that is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeenCluster {
+    /// A number for the cluster, the same in every picture of the scene.
+    pub number: u32,
+    /// Its level of detail: how often its triangles were simplified.
+    pub level: u32,
 }
 
 /// Texture format of the samples that are read back.
@@ -54,30 +64,82 @@ impl Renderer<'_> {
         grid: u32,
         wants_texels: bool,
     ) -> Result<Vec<Sample>, Error> {
+        let mut passes = vec![self.pass("picture", 2, SAMPLE_SHARE_PX)];
+        if wants_texels {
+            passes.push(self.pass("texels", 1, SAMPLE_SHARE_PX));
+        }
+        let no_texel = Vec4::new(0.0, 0.0, -1.0, 0.0);
+        let sample = |layers: &[Vec4]| {
+            Sample::new(layers[0], layers[1], layers.get(2).copied().unwrap_or(no_texel))
+        };
+        self.sampled(shading, rows, grid, &passes, sample)
+    }
+
+    /// The cluster in the middle of each pixel of some of a picture's rows, row by row from the
+    /// left; `None` in the sky. These are the clusters that [frames](Self::frame) are drawn of;
+    /// [`samples`](Self::samples) may be of finer ones. Where
+    /// [no clusters are drawn](Self::draws_clusters), all surfaces are one of level 0.
+    ///
+    /// # Errors
+    /// The device refused something or was lost.
+    pub fn seen_clusters(
+        &mut self,
+        shading: &Shading<'_>,
+        rows: Range<u32>,
+    ) -> Result<Vec<Option<SeenCluster>>, Error> {
+        let passes = [self.pass("clusters", 1, FRAME_SHARE_PX)];
+        let seen = |layers: &[Vec4]| {
+            let [number, level] = [layers[0].x, layers[0].y];
+            (level >= 0.0).then_some(SeenCluster { number: number as u32, level: level as u32 })
+        };
+        self.sampled(shading, rows, 1, &passes, seen)
+    }
+
+    /// The pass with the fragment shaders of this name, which write so many textures.
+    fn pass(&mut self, name: &'static str, textures: usize, share_px: f32) -> Pass {
+        let pipelines = self.pipelines(name, &vec![SAMPLE_FORMAT; textures]);
+        Pass { pipelines, textures, share_px }
+    }
+
+    /// Draws passes of samples, and makes a value of what they write for each.
+    fn sampled<T: Clone + Default>(
+        &mut self,
+        shading: &Shading<'_>,
+        rows: Range<u32>,
+        grid: u32,
+        passes: &[Pass],
+        value: impl Fn(&[Vec4]) -> T,
+    ) -> Result<Vec<T>, Error> {
         let width = shading.camera.image()[0] * grid;
         let [first, end] = [rows.start * grid, rows.end * grid];
-        let nothing = Sample::new(Vec4::ZERO, Vec4::ZERO, Vec4::new(0.0, 0.0, -1.0, 0.0));
-        let mut samples = vec![nothing; (width as usize) * (end - first) as usize];
+        let mut values = vec![T::default(); (width as usize) * (end - first) as usize];
         let side = TILE.min(self.gpu.device().limits().max_texture_dimension_2d);
-        let picture = self.pipelines("picture", &[SAMPLE_FORMAT, SAMPLE_FORMAT]);
-        let texels = wants_texels.then(|| self.pipelines("texels", &[SAMPLE_FORMAT]));
         let size = [side.min(width), side.min(end - first)];
-        let layers = Layers::new(self.gpu, size);
+        let layers = Layers::new(self.gpu, size, passes);
         for top in (first..end).step_by(side as usize) {
             for left in (0..width).step_by(side as usize) {
                 let size = [side.min(width - left), side.min(end - top)];
                 let tile = Tile { origin: [left, top], size, grid };
-                let data = layers.draw(self, shading, &tile, &picture, texels.as_ref())?;
-                for (i, sample) in data.into_iter().enumerate() {
+                let data = layers.draw(self, shading, &tile, passes)?;
+                for (i, written) in data.chunks(layers.count).enumerate() {
                     let [x, y] = [i as u32 % size[0] + left, i as u32 / size[0] + top - first];
                     let pixel = (y / grid) * (width / grid) + x / grid;
                     let within = (y % grid) * grid + x % grid;
-                    samples[(pixel * grid * grid + within) as usize] = sample;
+                    values[(pixel * grid * grid + within) as usize] = value(written);
                 }
             }
         }
-        Ok(samples)
+        Ok(values)
     }
+}
+
+/// Something to draw of each tile.
+struct Pass {
+    pipelines: Pipelines,
+    /// The number of textures that it writes.
+    textures: usize,
+    /// How far clusters may be off, pixels.
+    share_px: f32,
 }
 
 impl Sample {
@@ -98,17 +160,21 @@ impl Sample {
     }
 }
 
-/// The textures that a tile is drawn into, and a buffer through which all are read back.
+/// The textures that the passes of a tile are drawn into, one after the other, and a buffer through
+/// which all that they write is read back.
 struct Layers {
-    color: [Texture; 2],
+    color: Vec<Texture>,
     depth: Texture,
     readback: Buffer,
+    /// The number of textures that the passes write, all together.
+    count: usize,
     bytes_per_row: u32,
+    /// What a texture takes in the buffer.
     bytes: u64,
 }
 
 impl Layers {
-    fn new(gpu: &Gpu, [width, height]: [u32; 2]) -> Self {
+    fn new(gpu: &Gpu, [width, height]: [u32; 2], passes: &[Pass]) -> Self {
         let texture = |format| {
             gpu.device().create_texture(&TextureDescriptor {
                 label: Some("samples"),
@@ -121,49 +187,54 @@ impl Layers {
                 view_formats: &[],
             })
         };
+        let textures = || passes.iter().map(|pass| pass.textures);
+        let count = textures().sum();
         let bytes_per_row = (16 * width).next_multiple_of(COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(bytes_per_row) * u64::from(height);
         let readback = gpu.device().create_buffer(&BufferDescriptor {
             label: Some("samples"),
-            size: 3 * bytes,
+            size: count as u64 * bytes,
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
+        let most = textures().max().unwrap_or(0);
         Self {
-            color: [texture(SAMPLE_FORMAT), texture(SAMPLE_FORMAT)],
+            color: (0..most).map(|_| texture(SAMPLE_FORMAT)).collect(),
             depth: texture(DEPTH_FORMAT),
             readback,
+            count,
             bytes_per_row,
             bytes,
         }
     }
 
+    /// What the passes write for each sample of a tile, sample after sample.
     fn draw(
         &self,
         renderer: &mut Renderer<'_>,
         shading: &Shading<'_>,
         tile: &Tile,
-        picture: &Pipelines,
-        texels: Option<&Pipelines>,
-    ) -> Result<Vec<Sample>, Error> {
+        passes: &[Pass],
+    ) -> Result<Vec<Vec4>, Error> {
         let view = |t: &Texture| t.create_view(&TextureViewDescriptor::default());
-        let [first, second, depth] = [&self.color[0], &self.color[1], &self.depth].map(view);
+        let color: Vec<TextureView> = self.color.iter().map(view).collect();
+        let color: Vec<&TextureView> = color.iter().collect();
+        let depth = view(&self.depth);
         // A tile at the edge of the picture is drawn into a corner of the textures.
         let device = renderer.gpu.device();
-        let full = Tile { size: [self.color[0].width(), self.color[0].height()], ..*tile };
-        let (depth_store, is_frame) = (StoreOp::Discard, false);
+        let full = Tile { size: [self.depth.width(), self.depth.height()], ..*tile };
+        let depth_store = StoreOp::Discard;
         loop {
             let mut encoder = device.create_command_encoder(&Default::default());
-            let (color, pipelines) = (&[&first, &second][..], picture);
-            let target = Target { color, depth: &depth, depth_store, is_frame, pipelines };
-            renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-            self.copy(&mut encoder, 0, 0);
-            self.copy(&mut encoder, 1, 1);
-            if let Some(pipelines) = texels {
-                let target =
-                    Target { color: &[&first], depth: &depth, depth_store, is_frame, pipelines };
+            let mut layers = 0..;
+            for &Pass { ref pipelines, textures, share_px } in passes {
+                let color = &color[..textures];
+                let (depth, is_frame) = (&depth, false);
+                let target = Target { color, depth, depth_store, share_px, is_frame, pipelines };
                 renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-                self.copy(&mut encoder, 0, 2);
+                for (texture, layer) in self.color[..textures].iter().zip(&mut layers) {
+                    self.copy(&mut encoder, texture, layer);
+                }
             }
             renderer.gpu.queue().submit([encoder.finish()]);
             if renderer.is_whole(&mut Drawn::default())? {
@@ -173,22 +244,18 @@ impl Layers {
         let data: Vec<Vec4> = renderer.gpu.read(&self.readback)?;
         let layer = self.bytes as usize / size_of::<Vec4>();
         let row = self.bytes_per_row as usize / size_of::<Vec4>();
-        let none = Vec4::new(0.0, 0.0, -1.0, 0.0);
-        let mut samples = Vec::with_capacity((tile.size[0] * tile.size[1]) as usize);
-        for y in 0..tile.size[1] as usize {
-            for i in (0..tile.size[0] as usize).map(|x| y * row + x) {
-                let texel = if texels.is_some() { data[2 * layer + i] } else { none };
-                samples.push(Sample::new(data[i], data[layer + i], texel));
-            }
-        }
-        Ok(samples)
+        let [width, height] = tile.size.map(|side| side as usize);
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| y * row + x));
+        Ok(places
+            .flat_map(|i| (0..self.count).map(move |n| n * layer + i))
+            .map(|i| data[i])
+            .collect())
     }
 
-    /// Copies a texture into a third of the buffer.
-    fn copy(&self, encoder: &mut CommandEncoder, texture: usize, third: u64) {
-        let texture = &self.color[texture];
+    /// Copies a texture into the buffer, as its layer of this index.
+    fn copy(&self, encoder: &mut CommandEncoder, texture: &Texture, index: u64) {
         let layout = TexelCopyBufferLayout {
-            offset: third * self.bytes,
+            offset: index * self.bytes,
             bytes_per_row: Some(self.bytes_per_row),
             rows_per_image: None,
         };

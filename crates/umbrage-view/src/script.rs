@@ -313,7 +313,7 @@ mod tests {
             (r#"{"screenshot": "../x"}"#, "line 1: `shoot` needs a name"),
             (r#"{"size": [0, 5]}"#, "size: must be two numbers"),
             (r#"{"sun": [0, 0, 0]}"#, "line 1: "),
-            (r#"{"overlay": "rainbow"}"#, "none, error, texels, partition, difference"),
+            (r#"{"overlay": "rainbow"}"#, "none, error, texels, partition, difference, clusters"),
             (r#"{"camera": {"eye": [1, 2, 3]}}"#, "missing field `target`"),
             (r#"{"do": "jump"}"#, "there is no action `jump`"),
             (r#"{"do": "wait 3 days"}"#, "`wait` takes"),

@@ -96,16 +96,26 @@ pub(crate) enum OverlayKind {
     Texels,
     Partition,
     Difference,
+    Clusters,
 }
 
 impl OverlayKind {
-    pub(crate) const ALL: [(Self, &'static str, &'static str); 5] = [
+    pub(crate) const ALL: [(Self, &'static str, &'static str); 6] = [
         (Self::None, "none", "Show the plain pictures."),
         (Self::Error, "error", "Show how many pixels wide a texel is: above 1, edges are jagged."),
         (Self::Texels, "texels", "Show every fifth line of the texels' grid on the surfaces."),
         (Self::Partition, "partition", "Tint each surface by the map that serves it."),
         (Self::Difference, "difference", "Show false light and false shadow, once the view rests."),
+        (Self::Clusters, "clusters", "Tint the clusters of triangles by their level of detail."),
     ];
+
+    /// Why a scene cannot be shown so, if it cannot.
+    pub(crate) fn refusal(self, info: &SceneInfo) -> Option<&'static str> {
+        (self == Self::Clusters && !info.has_clusters).then_some(
+            "the scene is not drawn as clusters: those are of scenes of a million triangles or \
+             more, without animations",
+        )
+    }
 
     fn on_gpu(self) -> Option<Overlay> {
         match self {
@@ -113,6 +123,7 @@ impl OverlayKind {
             Self::Error => Some(Overlay::Error),
             Self::Texels => Some(Overlay::Texels),
             Self::Partition => Some(Overlay::Partition),
+            Self::Clusters => Some(Overlay::Clusters),
         }
     }
 }
@@ -358,6 +369,7 @@ pub(crate) mod tests {
             light_name: Some("sun".into()),
             clip: None,
             triangles: 12,
+            has_clusters: false,
         }
     }
 
@@ -414,6 +426,18 @@ pub(crate) mod tests {
         assert_eq!(settings.light(&info), before);
         settings.frozen = None;
         assert_ne!(settings.light(&info), before);
+    }
+
+    #[test]
+    fn clusters_are_only_shown_where_there_are_any() {
+        let mut info = info();
+        let refused = |info: &SceneInfo| {
+            let kinds = OverlayKind::ALL.iter().map(|(kind, ..)| *kind);
+            kinds.filter(|kind| kind.refusal(info).is_some()).collect::<Vec<_>>()
+        };
+        assert_eq!(refused(&info), [OverlayKind::Clusters]);
+        info.has_clusters = true;
+        assert_eq!(refused(&info), []);
     }
 
     #[test]

@@ -1,14 +1,14 @@
 //! `umbrage render`: its options.
 
 use super::session::SessionSceneArgs;
-use super::technique::{ExecutionArgs, Fit, TexelArgs};
+use super::technique::{BackendArg, ExecutionArgs, Fit, TexelArgs};
 use super::view::{LightArgs, ViewArgs};
 use crate::values;
 use anyhow::{Result, bail, ensure};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use umbrage::visibility::LightSize;
-use umbrage_lab::NamedTechnique;
+use umbrage_lab::{DetailOptions, NamedTechnique};
 
 /// `umbrage render`.
 #[derive(Debug, Args)]
@@ -76,6 +76,10 @@ pub(crate) enum Aov {
     /// against supersampled truth. EXR: the mean change of a pixel's error from frame to frame, NaN
     /// where pixels show more than one surface.
     Minification,
+    /// The clusters of triangles that a GPU draws frames of, tinted by their level of detail.
+    /// Scenes of any size are then drawn as clusters. EXR: level and number of the cluster, −1 in
+    /// the sky.
+    Clusters,
 }
 
 impl Aov {
@@ -94,6 +98,16 @@ impl Render {
             self.light_size.is_none() || self.aov.iter().any(|aov| aov.shows_truth()),
             "--light-size: only --aov truth and --aov difference show the truth"
         );
+        if self.shows_clusters() {
+            ensure!(
+                !self.execution.full_detail,
+                "--full-detail: leave it out for --aov clusters, which shows levels of detail"
+            );
+            ensure!(
+                self.execution.backend != BackendArg::Reference,
+                "--backend: --aov clusters shows what a GPU draws; take gpu"
+            );
+        }
         for (i, aov) in self.aov.iter().enumerate() {
             ensure!(!self.aov[..i].contains(aov), "--aov: `{}` is given twice", aov.word());
         }
@@ -118,6 +132,18 @@ impl Render {
             self.light_size = self.light_size.or(session.light_size);
         }
         self.check()
+    }
+
+    fn shows_clusters(&self) -> bool {
+        self.aov.contains(&Aov::Clusters)
+    }
+
+    /// How much detail a GPU draws: levels of it in any scene whose clusters are to be shown.
+    pub(crate) fn detail(&self) -> DetailOptions {
+        match self.execution.detail() {
+            DetailOptions::Auto if self.shows_clusters() => DetailOptions::Levels,
+            detail => detail,
+        }
     }
 
     /// The pictures to write, each with a file of its own.

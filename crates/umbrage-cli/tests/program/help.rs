@@ -9,6 +9,7 @@ fn every_command_has_help_with_an_example() {
         &["compare"],
         &["sweep"],
         &["plan"],
+        &["prepare"],
         &["info"],
         &["completions"],
         &["scenes"],
@@ -65,15 +66,16 @@ fn the_version_is_the_packages() {
 fn examples_of_the_help_parse() {
     // What needs no file of the user's must run as printed; the rest must be understood up to that.
     let desk = Desk::new();
-    for command in
-        ["render", "compare", "sweep", "plan", "info", "scenes", "theory", "bench", "devices"]
-    {
+    for command in [
+        "render", "compare", "sweep", "plan", "prepare", "info", "scenes", "theory", "bench",
+        "devices",
+    ] {
         let help = desk.succeed(&[command, "--help"]);
         let examples = help.split("Examples:").nth(1).unwrap().replace("\\\n", " ");
         for example in examples.lines().map(str::trim).filter(|l| l.starts_with("umbrage")) {
             let words: Vec<&str> = example.split_whitespace().skip(1).collect();
             let needs_file = words.iter().any(|w| w.ends_with(".glb") || w.ends_with(".json"));
-            let is_long = ["compare", "render", "bench"].contains(&command);
+            let is_long = ["compare", "render", "bench", "prepare"].contains(&command);
             if needs_file {
                 let run = desk.run(&words);
                 let understood = ["there is no file", "No such file"];

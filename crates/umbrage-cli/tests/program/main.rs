@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bench;
+mod clusters;
 mod compare;
 mod desk;
 mod figures;

@@ -6,7 +6,9 @@ use serde_json::json;
 use std::fmt::Write;
 use umbrage::Technique;
 use umbrage::language::{FILTERS, PARTITIONS, WARPS, Word};
-use umbrage_measure::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS as MAP_COLORS};
+use umbrage_measure::{
+    ErrorScale, FALSE_LIGHT, FALSE_SHADOW, LEVEL_COLORS, PARTITIONS as MAP_COLORS,
+};
 use umbrage_testing::needs;
 
 /// A small window whose picture lies between two bars: quick to draw without a GPU.
@@ -154,6 +156,30 @@ fn overlays_have_legends() {
     let is_false_light = |rgb: &[u8; 3]| *rgb == FALSE_LIGHT;
     let wrong = difference.picture([0.0, 1.0], [0.2, 0.7]).filter(is_false_light).count();
     assert!(wrong > 20, "{wrong} pixels of false light");
+}
+
+/// Only scenes that are drawn as clusters show their levels of detail.
+#[needs(gpu, window)]
+#[test]
+fn clusters_are_shown_where_there_are_any() {
+    let mut windows = Windows::new("clusters_are_shown_where_there_are_any");
+    let mut script = format!("{SMALL}technique uniform@64\n");
+    script += &shoot("overlay none", "ready", "plain");
+    script += &shoot("overlay clusters", "ready", "clusters");
+    // The overlay does not come along into a scene that has none.
+    script += &shoot("open pole", "ready", "small");
+    script += &shoot("press 6\nexpect not drawn as clusters", "ready", "refused");
+    // 49 statues have more than a million triangles.
+    let run = windows.script("statues:7", &script);
+    let [plain, clusters, small, refused] =
+        ["plain", "clusters", "small", "refused"].map(|name| run.shot(name));
+    clusters.is_fine().is_unlike(&plain, 2.0);
+    clusters.has_legend(&*LEVEL_COLORS);
+    small.is_fine();
+    assert!(refused.has_error());
+    let run = windows.try_script("pole", &format!("{SMALL}wait ready\noverlay clusters\n"));
+    assert_eq!(run.code, 1);
+    assert!(run.stderr.contains("the scene is not drawn as clusters"), "{}", run.stderr);
 }
 
 /// Two techniques that differ, and a technique and the truth, which hardly do.

@@ -11,7 +11,7 @@ mod view;
 
 use crate::{Error, ErrorScale, Pictures, Report, write_file};
 use askama::Template;
-pub(crate) use chart::{Tick, ticks};
+pub(crate) use chart::ticks;
 pub use command::{comma_separated, quoted, quoted_option};
 pub use figures::{FigureFile, FigureShown, FiguresPage, write_figures};
 use std::path::Path;

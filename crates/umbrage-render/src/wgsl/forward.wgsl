@@ -160,10 +160,15 @@ fn masked_surface(in: Fragment) -> Surface {
     let normal = triangle_normal(in);
     let normal_error = normal_error(in);
     let color = base_color(in);
-    if (color.a * in.uv_alpha.z < material.cutoff) {
+    if (is_hole(in, color.a)) {
         discard;
     }
     return surface(in, normal, normal_error, color.rgb);
+}
+
+// Whether a mesh with holes, whose material has this alpha here, has no surface here.
+fn is_hole(in: Fragment, alpha: f32) -> bool {
+    return alpha * in.uv_alpha.z < material.cutoff;
 }
 
 fn surface(in: Fragment, normal: vec3f, normal_error: f32, color: vec3f) -> Surface {
@@ -386,4 +391,27 @@ fn pixels_per_texel(spread: TexelSpread) -> f32 {
 @fragment
 fn sky_texels(@builtin(position) at: vec4f) -> @location(0) vec4f {
     return vec4f(0.0, 0.0, -1.0, 0.0);
+}
+
+// The number of the cluster that is seen, and its level of detail (-1: the sky).
+@fragment
+fn opaque_clusters(in: Fragment) -> @location(0) vec4f {
+    return seen_cluster(in);
+}
+
+@fragment
+fn masked_clusters(in: Fragment) -> @location(0) vec4f {
+    if (is_hole(in, base_color(in).a)) {
+        discard;
+    }
+    return seen_cluster(in);
+}
+
+fn seen_cluster(in: Fragment) -> vec4f {
+    return vec4f(vec2f(in.cluster), 0.0, 0.0);
+}
+
+@fragment
+fn sky_clusters(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return vec4f(0.0, -1.0, 0.0, 0.0);
 }

@@ -1,32 +1,36 @@
-// Frames that show what the maps do, over the picture or in its place. The text of `forward.wgsl`
-// must precede this one. Colours are mixed by their sRGB values, as the pictures of reports are.
+// Frames that show what the maps do or what was drawn, over the picture or in its place. The text
+// of `forward.wgsl` must precede this one. Colours are mixed by their sRGB values, as the pictures
+// of reports are.
 
 struct Overlay {
-    // ERROR, GRID or PARTITION.
+    // ERROR, GRID, PARTITION or CLUSTERS.
     kind: u32,
     // Logarithm of the upper end of the scale of errors, pixels per texel.
     log_max: f32,
     // Distance along the view beyond which no shadow counts, metres.
     far: f32,
-    // sRGB: the scale of errors, or the colour of the lines, or those of the maps.
+    // sRGB: the scale of errors, the colour of the lines, or those of the maps or of the levels of
+    // detail.
     colors: array<vec4f, 65>,
 }
 
 const ERROR: u32 = 0u;
 const GRID: u32 = 1u;
 const PARTITION: u32 = 2u;
+const CLUSTERS: u32 = 3u;
 const PARTITION_COLORS: u32 = 7u;
+const LEVEL_COLORS: u32 = 16u;
 
 @group(0) @binding(1) var<uniform> overlay: Overlay;
 
 @fragment
 fn opaque_overlay(in: Fragment) -> @location(0) vec4f {
-    return overlaid(in.clip, opaque_surface(in));
+    return overlaid(in, opaque_surface(in));
 }
 
 @fragment
 fn masked_overlay(in: Fragment) -> @location(0) vec4f {
-    return overlaid(in.clip, masked_surface(in));
+    return overlaid(in, masked_surface(in));
 }
 
 @fragment
@@ -34,8 +38,12 @@ fn sky_overlay(@builtin(position) at: vec4f) -> @location(0) vec4f {
     return shown(dimmed(srgb_from_linear(compress(sky(at.xy)))));
 }
 
-fn overlaid(at: vec4f, s: Surface) -> vec4f {
+fn overlaid(in: Fragment, s: Surface) -> vec4f {
+    let at = in.clip;
     let picture = srgb_from_linear(compress(radiance(s)));
+    if (overlay.kind == CLUSTERS) {
+        return shown(tinted(cluster_color(in.cluster), picture));
+    }
     let spread = texel_spread(at, s);
     let is_held = is_held(spread.place.map, s.position);
     if (overlay.kind == ERROR) {
@@ -51,9 +59,21 @@ fn overlaid(at: vec4f, s: Surface) -> vec4f {
     if (overlay.kind == GRID) {
         return shown(mix(0.6 * picture, overlay.colors[0].rgb, grid_cover(spread)));
     }
-    // The tint takes the lightness of the picture, so that the shading stays visible.
-    let tint = overlay.colors[shadow_maps[spread.place.map].index % PARTITION_COLORS].rgb;
-    return shown(tint * (0.25 + 0.75 * luma(picture)));
+    let map = shadow_maps[spread.place.map].index;
+    return shown(tinted(overlay.colors[map % PARTITION_COLORS].rgb, picture));
+}
+
+// A tint with the lightness of the picture, so that the shading stays visible.
+fn tinted(tint: vec3f, picture: vec3f) -> vec3f {
+    return tint * (0.25 + 0.75 * luma(picture));
+}
+
+// The colour of a cluster's level, a little darker by the cluster's number. Fibonacci hashing
+// (Knuth 1973) tells neighbours apart.
+fn cluster_color(cluster: vec2u) -> vec3f {
+    let level = min(cluster.y, LEVEL_COLORS - 1u);
+    let hash = f32((cluster.x * 2654435769u) >> 24u) / 255.0;
+    return overlay.colors[level].rgb * (1.0 - 0.25 * hash);
 }
 
 // Whether a map holds the point that it serves, as `shadow_map_visibility` decides it. Maps that

@@ -3,8 +3,10 @@
 use crate::{GPU, Set, scene};
 use glam::DVec3;
 use umbrage::{Camera, LookAt, Partition, Size, Technique};
-use umbrage_measure::{ErrorScale, FALSE_LIGHT, Image, PARTITIONS, Rgb};
-use umbrage_measure::{error_map, partition_map, texel_map};
+use umbrage_measure::{
+    ErrorScale, FALSE_LIGHT, Image, LEVEL_COLORS, PARTITIONS, Rgb, cluster_map, error_map,
+    partition_map, texel_map,
+};
 use umbrage_render::{Error, FrameTarget, Overlay, Renderer, SCALE_COLORS, SceneBuffers, Shading};
 use umbrage_testing::needs;
 use umbrage_trace::shade;
@@ -52,6 +54,11 @@ fn overlays_are_the_pictures_of_reports() {
     let map = Image::new(SIZE, map.collect()).unwrap();
     let texel = samples.iter().map(|s| s.texel.to_array());
     let texel = Image::new(SIZE, texel.collect()).unwrap();
+    // Without levels of detail, all surfaces are of the finest.
+    let clusters = renderer.seen_clusters(&shading, 0..SIZE[1]).unwrap();
+    let clusters = clusters.iter().map(|seen| seen.map(|c| [c.number, c.level]));
+    let clusters = Image::new(SIZE, clusters.collect()).unwrap();
+    assert!(clusters.pixels().iter().all(|seen| matches!(seen, None | Some([0, 0]))));
 
     let mut drawn = |overlay: Overlay<'_>| {
         renderer.frame_with(&overlay, &shading, &target, None).unwrap();
@@ -67,6 +74,10 @@ fn overlays_are_the_pictures_of_reports() {
     let expected = partition_map(&map, &picture).unwrap();
     let share = differing(&maps, &expected, 3);
     assert!(share < 0.002, "{share} of the maps differ");
+    let levels = drawn(Overlay::Clusters { colors: &LEVEL_COLORS });
+    let expected = cluster_map(&clusters, &picture).unwrap();
+    let share = differing(&levels, &expected, 3);
+    assert!(share < 0.002, "{share} of the clusters differ");
     // The report's lines are as wide as neighbouring pixels tell, which differs at edges.
     let grid = drawn(Overlay::Grid { color: FALSE_LIGHT });
     let expected = texel_map(&texel, &picture).unwrap();

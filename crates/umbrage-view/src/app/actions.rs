@@ -40,7 +40,12 @@ impl App<'_> {
             }
             Action::Compare(compare) => settings.compare = compare,
             Action::Wipe(at) => self.kept.shown.wipe = at.clamp(0.0, 1.0),
-            Action::Overlay(overlay) => settings.overlay = overlay,
+            Action::Overlay(overlay) => {
+                if let Some(reason) = self.info.as_ref().and_then(|info| overlay.refusal(info)) {
+                    return Err(reason.into());
+                }
+                settings.overlay = overlay;
+            }
             Action::Fit(fit) => settings.fit = fit,
             Action::Sun { azimuth_deg, elevation_deg } => {
                 settings.light = LightSetting::Sun(Sun { azimuth_deg, elevation_deg });

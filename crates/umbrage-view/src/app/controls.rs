@@ -105,8 +105,14 @@ impl App<'_> {
             .width(120.0)
             .show_ui(ui, |ui| {
                 for (overlay, name, tip) in OverlayKind::ALL {
-                    let is_chosen = overlay == settings.overlay;
-                    if ui.selectable_label(is_chosen, name).tip(tip).clicked() {
+                    let refusal = self.info.as_ref().and_then(|info| overlay.refusal(info));
+                    let button = egui::Button::selectable(overlay == settings.overlay, name);
+                    let row = ui.add_enabled(refusal.is_none(), button);
+                    let row = match refusal {
+                        Some(reason) => row.on_disabled_hover_text(reason),
+                        None => row,
+                    };
+                    if row.tip(tip).clicked() {
                         actions.push(Action::Overlay(overlay));
                     }
                 }

@@ -31,7 +31,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("W A S D Q E", "walk; with shift faster"),
     ("arrows", "turn, while the picture has the focus (Tab)"),
     ("shift and arrows", "move the sun, likewise"),
-    ("1 … 5", "overlays: none, error, texels, partition, difference"),
+    ("1 … 6", "overlays: none, error, texels, partition, difference, clusters"),
     ("O / C", "next overlay / next way to compare"),
     ("X / hold B", "swap the two techniques / the second while flipping"),
     ("V", "orbit or fly"),
@@ -205,7 +205,13 @@ impl App<'_> {
             Key::Num3 => overlay(2),
             Key::Num4 => overlay(3),
             Key::Num5 => overlay(4),
-            Key::O => Some(Action::Overlay(next(&OverlayKind::ALL, settings.overlay))),
+            Key::Num6 => overlay(5),
+            Key::O => {
+                let info = self.info.as_ref();
+                let is_shown = |kind: &OverlayKind| info.is_none_or(|i| kind.refusal(i).is_none());
+                let shown = OverlayKind::ALL.into_iter().filter(|(kind, ..)| is_shown(kind));
+                Some(Action::Overlay(next(&shown.collect::<Vec<_>>(), settings.overlay)))
+            }
             Key::C => Some(Action::Compare(next(&Compare::ALL, settings.compare))),
             Key::V => Some(Action::Fly(!settings.is_flying)),
             Key::F => Some(Action::Freeze(settings.frozen.is_none())),

@@ -5,7 +5,9 @@ use crate::stage::{DrawnPicture, Frame};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
 use glam::{DVec2, DVec3};
 use umbrage::{Camera, Plan, ShadowMap};
-use umbrage_measure::{ErrorScale, FALSE_LIGHT, FALSE_SHADOW, PARTITIONS, Rgb};
+use umbrage_measure::{
+    ErrorScale, FALSE_LIGHT, FALSE_SHADOW, LEVELS, PARTITIONS, Rgb, level_scale,
+};
 
 /// Colours of the lines.
 pub(super) const VIEW: Color32 = Color32::from_rgb(255, 255, 255);
@@ -176,7 +178,8 @@ pub(super) fn paint_in_map(painter: &Painter, rect: Rect, map: &ShadowMap, camer
 pub(super) fn paint_legend(painter: &Painter, rect: Rect, overlay: OverlayKind, plan: &Plan) {
     let rows: Vec<(Color32, String)> = match overlay {
         OverlayKind::None => return,
-        OverlayKind::Error => return paint_scale(painter, rect),
+        OverlayKind::Error => return paint_errors(painter, rect),
+        OverlayKind::Clusters => return paint_levels(painter, rect),
         OverlayKind::Texels => vec![(color(FALSE_LIGHT), "a line every 5 texels".into())],
         OverlayKind::Partition => {
             let maps = plan.maps.iter().enumerate().filter(|(_, map)| !map.is_empty());
@@ -224,27 +227,48 @@ pub(super) fn map_name(map: &ShadowMap) -> String {
 }
 
 /// Draws the scale of pixels per texel.
-fn paint_scale(painter: &Painter, rect: Rect) {
+fn paint_errors(painter: &Painter, rect: Rect) {
     let scale = ErrorScale::default();
+    let color = |share: f32| scale.color(scale.max().powf(2.0 * share - 1.0)).unwrap_or_default();
+    let labels = [("1/32", 1.0 / 32.0), ("1/8", 0.125), ("1", 1.0), ("8", 8.0), ("32", 32.0)];
+    let share = |error: f32| error.ln() / scale.max().ln() * 0.5 + 0.5;
+    let labels = labels.map(|(label, error)| (label.to_owned(), share(error)));
+    paint_scale(painter, rect, "pixels per texel", color, &labels);
+}
+
+/// Draws the colours of levels of detail.
+fn paint_levels(painter: &Painter, rect: Rect) {
+    let label = |level: usize| (level.to_string(), (level as f32 + 0.5) / LEVELS as f32);
+    let labels: Vec<_> = (0..LEVELS).step_by(3).map(label).collect();
+    paint_scale(painter, rect, "level of detail, 0 the finest", level_scale, &labels);
+}
+
+/// Draws a scale of colours into the lower left corner of a picture: the colour at each share of
+/// its length, and labels at some shares.
+fn paint_scale(
+    painter: &Painter,
+    rect: Rect,
+    title: &str,
+    color_at: impl Fn(f32) -> Rgb,
+    labels: &[(String, f32)],
+) {
     let width = (rect.width() - 40.0).clamp(80.0, 300.0);
     let area = Rect::from_min_size(rect.left_bottom() + vec2(8.0, -66.0), vec2(width + 24.0, 58.0));
     painter.rect_filled(area, 4.0, Color32::from_black_alpha(190));
     let font = FontId::proportional(13.0);
-    let title = area.min + vec2(12.0, 4.0);
-    painter.text(title, Align2::LEFT_TOP, "pixels per texel", font.clone(), Color32::WHITE);
+    let at = area.min + vec2(12.0, 4.0);
+    painter.text(at, Align2::LEFT_TOP, title, font.clone(), Color32::WHITE);
     let bar = Rect::from_min_size(area.min + vec2(12.0, 22.0), vec2(width, 12.0));
     let steps = width as usize;
     for i in 0..steps {
         let share = i as f32 / (steps - 1) as f32;
-        let error = scale.max().powf(2.0 * share - 1.0);
-        let stripe = Rect::from_min_size(bar.min + vec2(i as f32, 0.0), vec2(1.5, bar.height()));
-        painter.rect_filled(stripe, 0.0, color(scale.color(error).unwrap_or_default()));
+        // Each stripe lies over the rest of the one before, so that its soft edge does not show
+        // what is below the scale.
+        let stripe = Rect::from_min_max(bar.min + vec2(i as f32, 0.0), bar.max);
+        painter.rect_filled(stripe, 0.0, color(color_at(share)));
     }
-    for (label, error) in
-        [("1/32", 1.0 / 32.0), ("1/8", 0.125), ("1", 1.0), ("8", 8.0), ("32", 32.0)]
-    {
-        let x = bar.left() + (f32::ln(error) / scale.max().ln() * 0.5 + 0.5) * bar.width();
-        let at = Pos2::new(x, bar.bottom() + 2.0);
+    for (label, share) in labels {
+        let at = Pos2::new(bar.left() + share * bar.width(), bar.bottom() + 2.0);
         painter.text(at, Align2::CENTER_TOP, label, font.clone(), Color32::WHITE);
     }
 }

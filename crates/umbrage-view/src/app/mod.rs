@@ -15,7 +15,7 @@ mod windows;
 use crate::Outcome;
 use crate::action::Panel;
 use crate::session::{Kind, ToOpen};
-use crate::settings::{LightSetting, Settings};
+use crate::settings::{LightSetting, OverlayKind, Settings};
 use crate::stage::{Frame, Job, News, Request, SceneInfo, SceneToOpen, Stage};
 use egui::Ui;
 use measured::{History, Judged, Presets};
@@ -268,6 +268,9 @@ impl<'k> App<'k> {
         if let Some((_, time_s)) = clip {
             settings.clip = info.clip;
             settings.time_s = time_s;
+        }
+        if settings.overlay.refusal(&info).is_some() {
+            settings.overlay = OverlayKind::None;
         }
         self.path.clone_from(&settings.scene);
         self.drafts = [0, 1].map(|i| technique::Draft::new(&settings.techniques[i]));

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 use umbrage::visibility::LightSize;
 use umbrage::{Aabb, Camera, Light, Plan};
 use umbrage_lab::{Fit, NamedTechnique};
-use umbrage_measure::{ErrorScale, FALSE_LIGHT, PARTITIONS, Rgb};
+use umbrage_measure::{ErrorScale, FALSE_LIGHT, LEVEL_COLORS, PARTITIONS, Rgb};
 use umbrage_render::{FrameTarget, SCALE_COLORS};
 use umbrage_scene::SceneCamera;
 
@@ -52,6 +52,8 @@ pub(crate) enum Overlay {
     Texels,
     /// A tint for each map.
     Partition,
+    /// A tint for each level of detail.
+    Clusters,
 }
 
 impl Overlay {
@@ -72,6 +74,7 @@ impl Overlay {
             }
             Self::Texels => umbrage_render::Overlay::Grid { color: FALSE_LIGHT },
             Self::Partition => umbrage_render::Overlay::Partition { colors: &PARTITIONS },
+            Self::Clusters => umbrage_render::Overlay::Clusters { colors: &LEVEL_COLORS },
         }
     }
 }
@@ -154,6 +157,8 @@ pub(crate) struct SceneInfo {
     pub(crate) clip: Option<usize>,
     /// Number of triangles as drawn.
     pub(crate) triangles: u64,
+    /// Whether it is drawn as clusters of triangles.
+    pub(crate) has_clusters: bool,
 }
 
 impl SceneInfo {

@@ -124,6 +124,7 @@ fn open_and_draw(
         light_name: chosen_light.name,
         clip,
         triangles: scene.drawn_triangles(),
+        has_clusters: prepared.render().on_gpu().is_some_and(|(_, scene)| scene.has_clusters()),
     };
     let mut artist = Artist::new(&prepared, reporter, frames).ok_or("there is no GPU")?;
     reporter.tell(News::Open(Arc::new(info)));
