@@ -44,16 +44,22 @@ impl Detail {
     /// Makes or reads what the options ask for, if there is a GPU to draw it.
     ///
     /// # Errors
-    /// An error if a file cannot be read, is damaged, or was written for another scene.
+    /// An error if a file cannot be read, is damaged, or was written for another scene, or if
+    /// there is no GPU that could draw what it holds.
     pub fn new(
         scene: &Scene,
         executors: &Executors,
         options: &DetailOptions,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
+        let can_draw = executors.gpu().is_some_and(|gpu| gpu.support().clusters);
         let pays = scene.drawn_triangles() >= DetailOptions::MANY_TRIANGLES;
         match options {
-            _ if executors.gpu().is_none_or(|gpu| !gpu.support().clusters) => Ok(Self::FULL),
+            DetailOptions::File(path) if !can_draw => Err(Error::field(
+                Field::Clusters,
+                format!("{}: needs a GPU: rays see all triangles", path.display()),
+            )),
+            _ if !can_draw => Ok(Self::FULL),
             DetailOptions::Full => Ok(Self::FULL),
             DetailOptions::Auto if !pays => Ok(Self::FULL),
             DetailOptions::Auto | DetailOptions::Levels => Self::levels(scene, progress),

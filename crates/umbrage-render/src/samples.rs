@@ -224,22 +224,23 @@ impl Layers {
         let device = renderer.gpu.device();
         let full = Tile { size: [self.depth.width(), self.depth.height()], ..*tile };
         let depth_store = StoreOp::Discard;
-        loop {
-            let mut encoder = device.create_command_encoder(&Default::default());
-            let mut layers = 0..;
-            for &Pass { ref pipelines, textures, share_px } in passes {
-                let color = &color[..textures];
-                let (depth, is_frame) = (&depth, false);
-                let target = Target { color, depth, depth_store, share_px, is_frame, pipelines };
+        let mut first_layer = 0;
+        for &Pass { ref pipelines, textures, share_px } in passes {
+            let color = &color[..textures];
+            let (depth, is_frame) = (&depth, false);
+            let target = Target { color, depth, depth_store, share_px, is_frame, pipelines };
+            loop {
+                let mut encoder = device.create_command_encoder(&Default::default());
                 renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;
-                for (texture, layer) in self.color[..textures].iter().zip(&mut layers) {
+                for (texture, layer) in self.color[..textures].iter().zip(first_layer..) {
                     self.copy(&mut encoder, texture, layer);
                 }
+                renderer.gpu.queue().submit([encoder.finish()]);
+                if renderer.is_whole(&mut Drawn::default())? {
+                    break;
+                }
             }
-            renderer.gpu.queue().submit([encoder.finish()]);
-            if renderer.is_whole(&mut Drawn::default())? {
-                break;
-            }
+            first_layer += textures as u64;
         }
         let data: Vec<Vec4> = renderer.gpu.read(&self.readback)?;
         let layer = self.bytes as usize / size_of::<Vec4>();

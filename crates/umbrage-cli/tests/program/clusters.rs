@@ -118,6 +118,8 @@ fn files_of_something_else_are_refused() {
     render("missing", "No such file");
     std::fs::create_dir(desk.path("folder")).unwrap();
     render("folder", "");
+    let args = ["render", "town:20", "-o", "p.png", "--backend", "reference", "--clusters", FILE];
+    refuses(&desk, &args, "--clusters: town.clusters: needs a GPU");
     for other in ["town:21", "pole"] {
         let args = ["compare", other, "-o", "r", "--clusters", FILE];
         refuses(&desk, &args, "--clusters: town.clusters: the clusters belong to another scene");

@@ -72,10 +72,12 @@ fn agrees(name: &str, set: &Set<'_>, light: &Light, technique: &str) {
             is_sky(a) != is_sky(b) || (a.depth / b.depth - 1.0).abs() > 0.02
         })
         .count();
+    let maps = found.iter().zip(&whole).filter(|(a, b)| a.map != b.map).count();
     let wrong = [wrong(&found), wrong(&whole)];
     let told =
         format!("{name}, {technique}: {wrong:?} of {counted} wrong, {surfaces} surfaces differ");
     assert!(counted > 1000, "{told}");
+    assert!(maps * 100 < found.len(), "{told}, {maps} maps differ");
     // A sixteenth of a pixel of error moves edges over that share of pixels' centres.
     assert!(surfaces * 100 < found.len(), "{told}");
     assert!(wrong[0] * 10 <= wrong[1] * 11 + counted / 100, "{told}");

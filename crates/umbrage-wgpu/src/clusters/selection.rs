@@ -166,6 +166,8 @@ impl ClusterSelection {
     /// Encodes the choice of clusters for some views. Points of render space are relative to
     /// `render_origin` (world space, metres). In each view, draws of `0..batches` follow one
     /// another; one draw of the batches `0..together` of each view comes for free.
+    /// Submit what was encoded before you encode again, because all choices share buffers.
+    ///
     /// Pictures leave out what `occluders` hide, which must be those of the one picture among the
     /// views.
     ///
