@@ -153,6 +153,21 @@ impl Part {
         Self { vertices, positions, snapped, triangles }
     }
 
+    /// The first vertex of the part at each vertex's position, as indices into `vertices`.
+    pub(crate) fn firsts(&self, source: &Source) -> Vec<usize> {
+        let mut others = HashMap::new();
+        let first = |(i, &vertex): (usize, &u32)| {
+            let place = source.places[vertex as usize];
+            // Most vertices are alone at their position, which is then their own.
+            if place == vertex {
+                return i;
+            }
+            let first = self.vertices.binary_search(&place);
+            first.unwrap_or_else(|_| *others.entry(place).or_insert(i))
+        };
+        self.vertices.iter().enumerate().map(first).collect()
+    }
+
     /// Triangles with this part's vertices as triangles with those of a part that contains it.
     pub(crate) fn triangles_in(&self, other: &Part, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let place = |i: u32| {

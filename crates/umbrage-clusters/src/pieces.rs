@@ -5,7 +5,6 @@ use crate::part::{Part, Source};
 use crate::simplify::{area, by_edges, largest};
 use glam::Vec3;
 use meshopt::SimplifyVertex;
-use std::collections::BTreeMap;
 
 /// The shares of its triangles that a piece is reduced to. Below the last one, or if it is small
 /// anyway, it may become a single triangle.
@@ -26,11 +25,7 @@ pub(crate) struct Pieces {
 impl Pieces {
     pub(crate) fn new(source: &Source, part: &Part, locks: &[SimplifyVertex]) -> Self {
         // Pieces hang together at positions, not at vertices, which a seam has twice.
-        let mut firsts = BTreeMap::new();
-        let mut parents: Vec<usize> = Vec::with_capacity(part.vertices.len());
-        for (i, &vertex) in part.vertices.iter().enumerate() {
-            parents.push(*firsts.entry(source.places[vertex as usize]).or_insert(i));
-        }
+        let mut parents = part.firsts(source);
         fn root(parents: &mut [usize], mut i: usize) -> usize {
             while parents[i] != i {
                 parents[i] = parents[parents[i]];
@@ -45,7 +40,7 @@ impl Pieces {
             }
         }
         let mut pieces = Self { of: Vec::new(), vertices: Vec::new(), is_fixed: Vec::new() };
-        for i in 0..parents.len() {
+        for (i, lock) in locks.iter().enumerate() {
             let root = root(&mut parents, i);
             if root == i {
                 pieces.of.push(pieces.vertices.len());
@@ -57,7 +52,7 @@ impl Pieces {
             }
             let piece = pieces.of[i];
             pieces.vertices[piece].push(i as u32);
-            pieces.is_fixed[piece] |= locks[i].contains(SimplifyVertex::Lock);
+            pieces.is_fixed[piece] |= lock.contains(SimplifyVertex::Lock);
         }
         pieces
     }

@@ -5,7 +5,6 @@ use crate::pieces::Pieces;
 use crate::split::adapter;
 use glam::Vec3;
 use meshopt::{SimplifyOptions, SimplifyVertex};
-use std::collections::BTreeMap;
 
 /// What a turned normal counts for, as a share of the part's extent: enough to keep shading
 /// plausible, too little to spoil silhouettes for it.
@@ -114,12 +113,8 @@ pub(crate) fn by_edges(
 /// Where vertices at one position have different texture coordinates, a seam runs. It may be
 /// simplified along itself alone.
 fn protect_seams(source: &Source, part: &Part, locks: &mut [SimplifyVertex]) {
-    let mut firsts = BTreeMap::new();
-    for (i, &vertex) in part.vertices.iter().enumerate() {
-        let place = source.places[vertex as usize];
-        // Most vertices are alone at their position, which is then their own.
-        let first = *firsts.entry(place).or_insert(i);
-        if first != i && source.uv(vertex) != source.uv(part.vertices[first]) {
+    for (i, first) in part.firsts(source).into_iter().enumerate() {
+        if first != i && source.uv(part.vertices[i]) != source.uv(part.vertices[first]) {
             locks[i] |= SimplifyVertex::Protect;
             locks[first] |= SimplifyVertex::Protect;
         }
