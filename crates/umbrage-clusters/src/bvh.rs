@@ -19,7 +19,7 @@ fn dot<const D: usize>(a: &Point<D>, b: &Point<D>) -> f64 {
 
 /// A triangle as a corner and two edges, with the products that every query needs.
 #[derive(Clone, Copy)]
-struct Triangle<const D: usize> {
+pub(crate) struct Triangle<const D: usize> {
     corner: Point<D>,
     u: Point<D>,
     v: Point<D>,
@@ -29,7 +29,7 @@ struct Triangle<const D: usize> {
 }
 
 impl<const D: usize> Triangle<D> {
-    fn new([a, b, c]: [&Point<D>; 3]) -> Self {
+    pub(crate) fn new([a, b, c]: [&Point<D>; 3]) -> Self {
         let (u, v) = (minus(b, a), minus(c, a));
         Self { corner: *a, u, v, uu: dot(&u, &u), uv: dot(&u, &v), vv: dot(&v, &v) }
     }
@@ -38,7 +38,7 @@ impl<const D: usize> Triangle<D> {
     /// 2005, section 5.1.5. It only uses scalar products, and so holds in any dimension. Whatever
     /// rounding does, the result belongs to a point of the triangle, and is never too small.
     #[inline]
-    fn distance2(&self, point: &Point<D>) -> f32 {
+    pub(crate) fn distance2(&self, point: &Point<D>) -> f32 {
         let p = minus(point, &self.corner);
         let (d1, d2) = (dot(&self.u, &p), dot(&self.v, &p));
         if d1 <= 0.0 && d2 <= 0.0 {

@@ -107,9 +107,8 @@ impl Builder<'_> {
         let is_compared = self.source.triangles.len() <= MAX_COMPARED;
         let whole = is_compared.then(|| Part::new(self.source, &self.source.triangles));
         while count(&drafts) > FEWEST {
-            // Only one cluster is worth the large steps.
-            let share = if drafts.len() > 1 { 2 } else { 4 };
-            let target = (count(&drafts) / share).max(FEWEST / 2);
+            // Small steps: few triangles cost little, and nearly all distances see some of them.
+            let target = (2 * count(&drafts) / 3).max(FEWEST / 2);
             match coarser(self.source, drafts, target, MIN_GAIN, |_| false, whole.as_ref()) {
                 Outcome::Coarser { bounds, error, old, new } => {
                     self.keep(bounds, error, old);

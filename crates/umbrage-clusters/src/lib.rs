@@ -22,6 +22,8 @@ mod levels;
 #[cfg(feature = "build")]
 mod part;
 #[cfg(feature = "build")]
+mod pieces;
+#[cfg(feature = "build")]
 mod simplify;
 #[cfg(feature = "build")]
 mod split;

@@ -2,7 +2,7 @@
 
 use crate::MeshInput;
 use crate::deviation::deviation;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 
 /// A mesh that is known to be sound, and what all its parts need to know.
@@ -153,6 +153,21 @@ impl Part {
         Self { vertices, positions, snapped, triangles }
     }
 
+    /// The first vertex of the part at each vertex's position, as indices into `vertices`.
+    pub(crate) fn firsts(&self, source: &Source) -> Vec<usize> {
+        let mut others = HashMap::new();
+        let first = |(i, &vertex): (usize, &u32)| {
+            let place = source.places[vertex as usize];
+            // Most vertices are alone at their position, which is then their own.
+            if place == vertex {
+                return i;
+            }
+            let first = self.vertices.binary_search(&place);
+            first.unwrap_or_else(|_| *others.entry(place).or_insert(i))
+        };
+        self.vertices.iter().enumerate().map(first).collect()
+    }
+
     /// Triangles with this part's vertices as triangles with those of a part that contains it.
     pub(crate) fn triangles_in(&self, other: &Part, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let place = |i: u32| {
@@ -172,27 +187,32 @@ impl Part {
     /// How far the part's triangles and `coarse`, which has the part's vertices, lie from each
     /// other, metres.
     pub(crate) fn deviation(&self, source: &Source, coarse: &[[u32; 3]]) -> f32 {
-        let (center, radius) = self.extent();
+        let (_, radius) = self.extent();
         if radius <= 0.0 {
             return 0.0;
         }
-        let at = |i: usize| ((self.positions[i].as_dvec3() - center) / radius).as_vec3();
-        let all = 0..self.positions.len();
+        let points = self.points(source);
         let deviation = if source.mesh.is_masked && source.metres_per_uv > 0.0 {
-            let scale = f64::from(source.metres_per_uv) / radius;
-            let first = source.uv(self.vertices[0]).as_dvec2();
-            let points: Vec<[f32; 5]> = all
-                .map(|i| {
-                    let uv = (source.uv(self.vertices[i]).as_dvec2() - first) * scale;
-                    let [x, y, z] = at(i).to_array();
-                    [x, y, z, uv.x as f32, uv.y as f32]
-                })
-                .collect();
             deviation(&points, &self.triangles, coarse)
         } else {
-            let points: Vec<[f32; 3]> = all.map(|i| at(i).to_array()).collect();
+            let points: Vec<[f32; 3]> = points.iter().map(|&[x, y, z, ..]| [x, y, z]).collect();
             deviation(&points, &self.triangles, coarse)
         };
         ((f64::from(deviation) * radius) as f32).next_up()
+    }
+
+    /// The vertices as points from -1 to 1, in space and, if that decides where the surface is, in
+    /// the texture.
+    pub(crate) fn points(&self, source: &Source) -> Vec<[f32; 5]> {
+        let (center, radius) = self.extent();
+        let has_texture = source.mesh.is_masked && source.metres_per_uv > 0.0;
+        let scale = f64::from(source.metres_per_uv) / radius;
+        let uv = |i: usize| source.uv(self.vertices[i]).as_dvec2();
+        let point = |i: usize| {
+            let [x, y, z] = ((self.positions[i].as_dvec3() - center) / radius).as_vec3().to_array();
+            let uv = if has_texture { (uv(i) - uv(0)) * scale } else { DVec2::ZERO };
+            [x, y, z, uv.x as f32, uv.y as f32]
+        };
+        (0..self.positions.len()).map(point).collect()
     }
 }

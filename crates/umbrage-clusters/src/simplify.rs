@@ -1,10 +1,10 @@
 //! Fewer triangles for a part of a mesh, without a change along its border.
 
 use crate::part::{Part, Source};
+use crate::pieces::Pieces;
 use crate::split::adapter;
 use glam::Vec3;
 use meshopt::{SimplifyOptions, SimplifyVertex};
-use std::collections::BTreeMap;
 
 /// What a turned normal counts for, as a share of the part's extent: enough to keep shading
 /// plausible, too little to spoil silhouettes for it.
@@ -42,28 +42,26 @@ pub(crate) fn simplify(
         (triangles, deviation)
     };
 
-    let edges = by_edges(source, part, 3 * target, locks.clone());
-    if edges.len() <= target + target / 8 {
-        let edges = measured(edges);
-        if f64::from(edges.1) <= SUSPICIOUS * part.extent().1 || source.mesh.is_masked {
-            return Some(edges);
-        }
-        let other = measured(sloppy(part, 3 * target, &locks));
-        return Some(if other.1 < edges.1 { other } else { edges });
+    let pieces = Pieces::new(source, part, &locks);
+    let edges = pieces.coarsened(source, part, target, &locks);
+    let is_small = edges.len() <= target + target / 8;
+    let edges = measured(edges);
+    if is_small && f64::from(edges.1) <= SUSPICIOUS * part.extent().1 {
+        return Some(edges);
     }
-    let other = if source.mesh.is_masked {
-        pruned(source, part, &edges, target, &locks)
-    } else {
-        sloppy(part, 3 * target, &locks)
-    };
-    let is_better = !other.is_empty() && other.len() < edges.len();
-    let best = if is_better { other } else { edges };
-    (best.len() <= most).then(|| measured(best))
+    // Small pieces cannot get much simpler each. Some of them go, or are joined.
+    let mut candidates = vec![pieces.thinned(source, part, &edges.0, target)];
+    if !source.mesh.is_masked {
+        candidates.push(sloppy(part, 3 * target, &locks));
+    }
+    let candidates = candidates.into_iter().map(measured).chain([edges]);
+    let small = candidates.filter(|(triangles, _)| triangles.len() <= most);
+    small.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Edges are collapsed in the order of their quadric errors. These only serve as an order: what a
 /// simplification is off by is measured afterwards.
-fn by_edges(
+pub(crate) fn by_edges(
     source: &Source,
     part: &Part,
     target: usize,
@@ -115,12 +113,8 @@ fn by_edges(
 /// Where vertices at one position have different texture coordinates, a seam runs. It may be
 /// simplified along itself alone.
 fn protect_seams(source: &Source, part: &Part, locks: &mut [SimplifyVertex]) {
-    let mut firsts = BTreeMap::new();
-    for (i, &vertex) in part.vertices.iter().enumerate() {
-        let place = source.places[vertex as usize];
-        // Most vertices are alone at their position, which is then their own.
-        let first = *firsts.entry(place).or_insert(i);
-        if first != i && source.uv(vertex) != source.uv(part.vertices[first]) {
+    for (i, first) in part.firsts(source).into_iter().enumerate() {
+        if first != i && source.uv(part.vertices[i]) != source.uv(part.vertices[first]) {
             locks[i] |= SimplifyVertex::Protect;
             locks[first] |= SimplifyVertex::Protect;
         }
@@ -141,64 +135,12 @@ fn sloppy(part: &Part, target: usize, locks: &[SimplifyVertex]) -> Vec<[u32; 3]>
     indices.as_chunks::<3>().0.to_vec()
 }
 
-/// Leaves out whole pieces of `triangles`, the smallest first, until `target` is reached. Pieces
-/// that touch the border stay, since their neighbours know nothing of their going.
-fn pruned(
-    source: &Source,
-    part: &Part,
-    triangles: &[[u32; 3]],
-    target: usize,
-    locks: &[SimplifyVertex],
-) -> Vec<[u32; 3]> {
-    // Pieces hang together at positions, not at vertices, which a seam has twice.
-    let mut firsts = BTreeMap::new();
-    let mut parents: Vec<usize> = Vec::with_capacity(part.vertices.len());
-    for (i, &vertex) in part.vertices.iter().enumerate() {
-        parents.push(*firsts.entry(source.places[vertex as usize]).or_insert(i));
-    }
-    fn root(parents: &mut [usize], mut i: usize) -> usize {
-        while parents[i] != i {
-            parents[i] = parents[parents[i]];
-            i = parents[i];
-        }
-        i
-    }
-    for &[a, b, c] in triangles {
-        for other in [b, c] {
-            let (a, b) = (root(&mut parents, a as usize), root(&mut parents, other as usize));
-            parents[a.max(b)] = a.min(b);
-        }
-    }
-    let mut pieces: BTreeMap<usize, (f32, Vec<[u32; 3]>, bool)> = BTreeMap::new();
-    for &triangle in triangles {
-        let piece = pieces.entry(root(&mut parents, triangle[0] as usize)).or_default();
-        piece.0 += area(part, triangle);
-        piece.2 |= triangle.iter().any(|&i| locks[i as usize].contains(SimplifyVertex::Lock));
-        piece.1.push(triangle);
-    }
-    // Among pieces of about the same area those that go are scattered.
-    let mut pieces: Vec<_> = pieces.into_iter().collect();
-    pieces.sort_by_key(|(first, (area, _, is_fixed))| {
-        let class = if *area > 0.0 { area.log2().floor() as i32 } else { i32::MIN };
-        (*is_fixed, class, (*first as u32).wrapping_mul(0x9e37_79b9))
-    });
-    let mut left = triangles.len();
-    pieces.retain(|(_, (_, triangles, is_fixed))| {
-        let goes = !is_fixed && left > target && left > triangles.len();
-        if goes {
-            left -= triangles.len();
-        }
-        !goes
-    });
-    pieces.into_iter().flat_map(|(_, (_, triangles, _))| triangles).collect()
-}
-
-fn area(part: &Part, triangle: [u32; 3]) -> f32 {
+pub(crate) fn area(part: &Part, triangle: [u32; 3]) -> f32 {
     let [a, b, c]: [Vec3; 3] = triangle.map(|i| part.positions[i as usize]);
     (b - a).cross(c - a).length()
 }
 
-fn largest(part: &Part) -> Option<[u32; 3]> {
+pub(crate) fn largest(part: &Part) -> Option<[u32; 3]> {
     let triangles = part.triangles.iter().copied();
     triangles.max_by(|&a, &b| area(part, a).total_cmp(&area(part, b)))
 }

@@ -66,6 +66,50 @@ fn edges_of_a_smooth_closed_surface_have_exactly_two_triangles() {
     }
 }
 
+/// Pieces may open where they become single triangles, but only as a whole: never between what
+/// comes of one group and of another.
+#[test]
+fn closed_pieces_in_several_groups_stay_closed() {
+    let shape = common::balls(8);
+    let mesh = built(&shape);
+    let own = shape.positions.len() / 8;
+    let mut shared = 0;
+    for seed in 0..40 {
+        let mut random = Random(seed);
+        let eye = random.point() * 8.0 - 2.0;
+        let drawn = cut(&mesh, seen_from(eye, 0.1 * random.next().powi(3)));
+        for ball in 0..8 {
+            let mut sources = std::collections::HashSet::new();
+            let mut triangles = Vec::new();
+            for cluster in &drawn {
+                let all = corners(&mesh, cluster);
+                let of_ball = all.iter().filter(|t| t[0] as usize / own == ball);
+                let before = triangles.len();
+                triangles.extend(of_ball.copied());
+                if triangles.len() > before {
+                    sources.insert(cluster.error.to_bits());
+                }
+            }
+            if sources.len() > 1 {
+                shared += 1;
+                let odd = edges(&shape, &triangles).values().filter(|&&n| n % 2 == 1).count();
+                assert_eq!(odd, 0, "ball {ball} from {eye}");
+            }
+        }
+    }
+    assert!(shared > 20, "only {shared} balls in several groups");
+}
+
+/// Thin pieces cost what they look like: a twig is a triangle long before its bend is lost.
+#[test]
+fn twigs_become_few_triangles_within_a_small_error() {
+    let shape = common::twigs(300);
+    let mesh = built(&shape);
+    let drawn = cut(&mesh, |_, error| error <= 0.1);
+    let triangles: u32 = drawn.iter().map(|cluster| cluster.triangle_count).sum();
+    assert!(triangles < 900, "{triangles} of {}", shape.triangles.len());
+}
+
 /// Without allowance the mesh itself is drawn: as many triangles of the same corners, up to the
 /// order of corners around each.
 #[test]

@@ -48,11 +48,13 @@ fn distance2(p: &Point, [a, b, c]: &[Point; 3]) -> f64 {
     let (wu, wv) = (dot(&w, &u), dot(&w, &v));
     let area = uu * vv - uv * uv;
     let (s, t) = ((vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area);
+    // In slivers, rounding leaves nothing of `s` and `t`. Then the edges know better.
+    let edges = on_edge(p, a, b).min(on_edge(p, b, c)).min(on_edge(p, c, a));
     if area > 0.0 && s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
         let r: Point = std::array::from_fn(|i| w[i] - s * u[i] - t * v[i]);
-        return dot(&r, &r);
+        return dot(&r, &r).min(edges);
     }
-    on_edge(p, a, b).min(on_edge(p, b, c)).min(on_edge(p, c, a))
+    edges
 }
 
 impl Surface {

@@ -180,6 +180,39 @@ pub(crate) fn walls() -> Shape {
     shape
 }
 
+/// Closed balls that share nothing, each larger than a group of clusters.
+pub(crate) fn balls(count: u32) -> Shape {
+    let mut random = Random(5);
+    let ball = sphere(32, 0.02);
+    let mut shape = Shape::default();
+    for _ in 0..count {
+        let (at, radius) = (random.point() * 4.0, 0.1 + 0.2 * random.next());
+        let first = shape.positions.len() as u32;
+        shape.positions.extend(ball.positions.iter().map(|&p| at + p * radius));
+        shape.triangles.extend(ball.triangles.iter().map(|t| t.map(|i| first + i)));
+    }
+    shape
+}
+
+/// Thin bent tubes of three sides, as twigs are, around two thick ones.
+pub(crate) fn twigs(count: u32) -> Shape {
+    use std::f32::consts::TAU;
+    let mut random = Random(9);
+    let mut shape = Shape::default();
+    for twig in 0..count {
+        let (sides, radius) = if twig < 2 { (24, 0.3) } else { (3, 0.01) };
+        let (at, along) = (random.point() * 4.0, random.point() - 0.5);
+        let bend = 0.2 * (random.point() - 0.5);
+        let (u, v) = along.normalize_or(Vec3::Z).any_orthonormal_pair();
+        shape.grid(sides, 4, |s, t| {
+            // Ends meet exactly.
+            let (sin, cos) = if s == 1.0 { (0.0, 1.0) } else { (s * TAU).sin_cos() };
+            at + along * t + bend * (t * t) + radius * (u * cos + v * sin)
+        });
+    }
+    shape
+}
+
 pub(crate) fn noise(count: u32) -> Shape {
     let mut random = Random(11);
     let mut shape = Shape::default();
@@ -203,6 +236,8 @@ pub(crate) fn all() -> Vec<(&'static str, Shape)> {
         ("cards", cards(3000, false)),
         ("masked cards", cards(3000, true)),
         ("walls", walls()),
+        ("balls", balls(8)),
+        ("twigs", twigs(300)),
         ("noise", noise(3000)),
         ("huge terrain", terrain(40, false).scaled(2e5)),
         ("tiny sphere", sphere(30, 0.1).scaled(1e-6)),
