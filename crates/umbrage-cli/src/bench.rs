@@ -3,7 +3,7 @@
 use crate::args::bench;
 use crate::output::{aligned, print};
 use crate::progress::Bar;
-use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_notices};
+use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_detail, tell_notices};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -142,6 +142,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let bounds = receivers.bounds(seen.as_ref());
     bar.aside(|| {
         tell_notices(&scene);
+        tell_detail(&render_scene);
         tell_chosen(&chosen_view, &lights);
         announce(&executors);
     });

@@ -3,7 +3,7 @@
 use crate::args;
 use crate::output::{aligned, command_line, note, print};
 use crate::progress::Bar;
-use crate::setup::{announce, open_changed, tell_notices};
+use crate::setup::{announce, open_changed, tell_detail, tell_notices};
 use anyhow::Result;
 use umbrage_lab::{
     Comparison, Contents, Detail, Executors, Motion, NOTHING_TO_SHADOW, PreparedScene, Progress,
@@ -32,6 +32,7 @@ pub(crate) fn run(args: &args::Compare, quiet: bool) -> Result<()> {
     }
     bar.aside(|| {
         tell_notices(&scene);
+        tell_detail(prepared.render());
         announce(&executors);
     });
     bar.chosen(comparison.chosen_view(), comparison.chosen_light());

@@ -3,7 +3,9 @@
 use crate::args::{self, Aov, PictureArgs, PictureKind};
 use crate::output::note;
 use crate::progress::Bar;
-use crate::setup::{Chosen, announce, choose, open_changed, tell_chosen, tell_notices};
+use crate::setup::{
+    Chosen, announce, choose, open_changed, tell_chosen, tell_detail, tell_notices,
+};
 use anyhow::{Context, Result, ensure};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
@@ -82,6 +84,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     }
     bar.aside(|| {
         tell_notices(&scene);
+        tell_detail(&render_scene);
         tell_chosen(&chosen, &lights);
         announce(&executors);
     });

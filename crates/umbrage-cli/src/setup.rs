@@ -8,7 +8,8 @@ use glam::DVec3;
 use std::path::Path;
 use umbrage::Light;
 use umbrage_lab::{
-    ChosenLight, ChosenView, Defaults, Executors, LightOptions, Progress, choose_light, choose_view,
+    ChosenLight, ChosenView, Defaults, Executors, LightOptions, Progress, RenderScene,
+    choose_light, choose_view,
 };
 use umbrage_scene::{Lens, Scene, SceneCamera};
 
@@ -62,6 +63,13 @@ pub(crate) fn choose(
 pub(crate) fn tell_notices(scene: &Scene) {
     for notice in scene.all_notices() {
         log::warn!("{}: {}", scene.name, notice.0);
+    }
+}
+
+/// Warns of what users should know of how the scene is drawn.
+pub(crate) fn tell_detail(scene: &RenderScene<'_>) {
+    if let Some(notice) = scene.notice() {
+        log::warn!("{notice}");
     }
 }
 

@@ -19,6 +19,7 @@ use umbrage_wgpu::{Casters, LookupBuffers, SeenReadback, ShadowOptions};
 pub struct RenderScene<'a> {
     tracer: Tracer<'a>,
     gpu: Option<(&'a Gpu, SceneBuffers)>,
+    lost_detail: bool,
 }
 
 impl<'a> RenderScene<'a> {
@@ -38,12 +39,21 @@ impl<'a> RenderScene<'a> {
         let clusters = detail.clusters();
         let buffers = |gpu| SceneBuffers::with_clusters(gpu, scene, opaque, clusters).on_gpu();
         let gpu = executors.gpu().map(|gpu| buffers(gpu).map(|b| (gpu, b))).transpose()?;
-        Ok(Self { tracer, gpu })
+        let lost_detail =
+            clusters.is_some() && gpu.as_ref().is_some_and(|(_, scene)| !scene.has_clusters());
+        Ok(Self { tracer, gpu, lost_detail })
     }
 
     /// Returns the scene in the form that rays are traced in.
     pub fn tracer(&self) -> &Tracer<'a> {
         &self.tracer
+    }
+
+    /// Returns what users should know of how the scene is drawn.
+    pub fn notice(&self) -> Option<&'static str> {
+        self.lost_detail.then_some(
+            "The GPU has no room for the scene's levels of detail: all triangles are drawn.",
+        )
     }
 
     /// Returns the GPU and the scene's buffers on it, if there is a GPU.

@@ -60,6 +60,7 @@ impl<'a> PreparedScene<'a> {
             notices
                 .push("Alpha masks are ignored: masked materials show and cast as solid.".into());
         }
+        notices.extend(self.render.notice().map(String::from));
         notices
     }
 }
