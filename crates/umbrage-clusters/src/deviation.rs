@@ -3,7 +3,7 @@
 use crate::bvh::{Bvh, Point};
 
 /// The points at which surfaces are compared, in all triangles of one of them together.
-const SAMPLES: usize = 16_000;
+const SAMPLES: usize = 8_000;
 
 /// The most parts of a triangle's edge.
 const MAX_PARTS: usize = 12;

@@ -67,7 +67,8 @@ impl Pieces {
         target: usize,
         locks: &[SimplifyVertex],
     ) -> Vec<[u32; 3]> {
-        if self.vertices.len() == 1 {
+        // Pieces at the border cannot vanish, and are most often patches of one smooth surface.
+        if self.vertices.len() == 1 || self.is_fixed.iter().all(|&is_fixed| is_fixed) {
             let mut ends = locks.to_vec();
             lock_ends(source, part, &mut ends);
             return by_edges(source, part, 3 * target, ends);

@@ -13,8 +13,7 @@ const NORMAL_WEIGHT: f32 = 0.25;
 /// What a shift of an opaque texture counts for, metres per metre.
 const OPAQUE_UV_WEIGHT: f32 = 0.25;
 
-/// A deviation, as a share of a part's extent, that suggests that edges were collapsed only where
-/// slivers did not prevent it.
+/// A deviation, as a share of a part's extent, that suggests that another way is better.
 const SUSPICIOUS: f64 = 0.1;
 
 /// Simplification of `part` to `target` triangles, or as near to that as possible, and what it is
