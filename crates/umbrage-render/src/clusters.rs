@@ -10,8 +10,8 @@ use umbrage::{Camera, Plane};
 use umbrage_clusters::{Ball, ClusterMesh};
 use umbrage_scene::Scene;
 use umbrage_wgpu::{
-    AttributeLayout, ClusterCasters, ClusterGeometry, ClusterInstance, ClusterOccluders,
-    ClusterSelection, ClusterSource, ClusterVertices, ClusterView, Shadows,
+    AttributeLayout, ClusterCasters, ClusterCounts, ClusterGeometry, ClusterInstance,
+    ClusterOccluders, ClusterSelection, ClusterSource, ClusterVertices, ClusterView, Shadows,
 };
 use wgpu::{
     BindGroupLayout, CompareFunction, PipelineLayout, PipelineLayoutDescriptor, RenderPipeline,
@@ -130,6 +130,7 @@ pub(crate) struct ClusterDrawing {
     pub(crate) picture: ClusterSelection,
     /// What hides parts of frames that follow one another.
     pub(crate) occluders: ClusterOccluders,
+    pub(crate) hiding: Hiding,
     shader: ShaderModule,
     layout: PipelineLayout,
     /// Pipelines by the names of their fragment shaders, made at first use.
@@ -185,6 +186,7 @@ impl ClusterDrawing {
             casters: ClusterCasters::new(device, shadows, geometry, ClusterCasters::SHARE)?,
             picture: ClusterSelection::new(device, &gpu.support(), geometry),
             occluders: ClusterOccluders::new(device),
+            hiding: Hiding::default(),
             depths,
             shader,
             layout,
@@ -208,6 +210,49 @@ impl ClusterDrawing {
     }
 }
 
+/// Whether it pays to look for what is hidden, for which the last frame is drawn once more.
+#[derive(Debug, Default)]
+pub(crate) struct Hiding {
+    pub(crate) is_sought: bool,
+    /// Triangles of the last frame in which nothing was sought.
+    all: u64,
+    /// Triangles of the first frame in which it was found to pay.
+    found: Option<u64>,
+    /// Frames to come until it is tried again.
+    wait: u32,
+}
+
+impl Hiding {
+    /// Frames between trials where it does not pay.
+    const PAUSE: u32 = 32;
+
+    /// Takes in the newest counts.
+    pub(crate) fn learn(&mut self, counts: ClusterCounts) {
+        // Counts of a frame before the last change come late.
+        if !counts.is_complete || counts.has_occluders != self.is_sought {
+            return;
+        }
+        let triangles = counts.triangles;
+        if !self.is_sought {
+            self.all = triangles;
+            self.is_sought = self.wait == 0;
+            self.found = None;
+            self.wait = self.wait.saturating_sub(1);
+            return;
+        }
+        match self.found {
+            // A fifth of the triangles is about what the pass for them costs.
+            None if 5 * triangles > 4 * self.all => {
+                *self = Self { wait: Self::PAUSE, ..Self::default() };
+            }
+            None => self.found = Some(triangles),
+            // The view has opened, and all may be seen now.
+            Some(found) if 2 * triangles > 3 * found => *self = Self::default(),
+            Some(_) => {}
+        }
+    }
+}
+
 /// What a tile of a picture shows.
 pub(crate) fn picture_view(
     camera: &Camera,
@@ -227,4 +272,36 @@ pub(crate) fn picture_view(
         |plane: &Plane| Plane { offset: plane.offset + plane.normal.dot(camera.eye()), ..*plane };
     let planes: Vec<Plane> = planes.iter().map(of_render).collect();
     Ok(ClusterView::picture(samples_from_render, tile.size, nearest, &planes, share)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of a view with so many triangles, of which a share is hidden, with counts that come
+    /// back a frame late. Returns in how many it was sought what is hidden.
+    fn frames(hiding: &mut Hiding, count: u32, all: u64, hidden: f64) -> u32 {
+        let (mut sought, mut late) = (0, None);
+        for _ in 0..count {
+            let has_occluders = hiding.is_sought;
+            sought += u32::from(has_occluders);
+            let seen = if has_occluders { 1.0 - hidden } else { 1.0 };
+            let triangles = (all as f64 * seen) as u64;
+            let (clusters, relief) = (triangles / 64, 1.0);
+            let counts =
+                ClusterCounts { triangles, clusters, is_complete: true, has_occluders, relief };
+            late.replace(counts).into_iter().for_each(|counts| hiding.learn(counts));
+        }
+        sought
+    }
+
+    #[test]
+    fn what_is_hidden_is_sought_where_it_pays() {
+        let mut hiding = Hiding::default();
+        assert!(frames(&mut hiding, 300, 1_000_000, 0.6) > 295);
+        // The view opens, and nothing is hidden any more.
+        let sought = frames(&mut hiding, 300, 1_000_000, 0.05);
+        assert!((5..40).contains(&sought), "{sought}");
+        assert!(frames(&mut hiding, 300, 1_000_000, 0.6) > 260);
+    }
 }

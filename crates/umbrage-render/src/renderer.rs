@@ -488,7 +488,10 @@ impl<'g> Renderer<'g> {
             let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
             let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
             let (device, queue) = (gpu.device(), gpu.queue());
-            let ClusterDrawing { picture, occluders, depths, .. } = drawing;
+            let ClusterDrawing { picture, occluders, hiding, depths, .. } = drawing;
+            if target.is_frame {
+                hiding.learn(picture.counts(device));
+            }
             let (geometry, eye) = (&own.geometry, camera.eye());
             let mut draw_depths = |encoder: &mut CommandEncoder, picture: &_, group: &_| {
                 let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
@@ -515,7 +518,8 @@ impl<'g> Renderer<'g> {
                 drop(pass);
                 queries.extend(query);
             };
-            let again = picture.draw_again(queue, geometry, eye).filter(|_| target.is_frame);
+            let seeks = target.is_frame && hiding.is_sought;
+            let again = picture.draw_again(queue, geometry, eye).filter(|_| seeks);
             let hides = again.is_some();
             if let Some(group) = again {
                 draw_depths(encoder, picture, group);

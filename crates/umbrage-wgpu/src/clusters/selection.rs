@@ -56,6 +56,8 @@ pub struct ClusterCounts {
     /// Whether all that should be drawn had room. If not, the next choice has more of it, or takes
     /// less.
     pub is_complete: bool,
+    /// Whether something could hide clusters.
+    pub has_occluders: bool,
     /// The factor by which more error is allowed than the views ask for: 1, but where the device has
     /// no room for what they ask for.
     pub relief: f32,
@@ -111,8 +113,16 @@ struct Sizes {
 struct Slot {
     readback: Buffer,
     state: Arc<AtomicU8>,
-    /// The number of the choice that it counts, the room that this had, and the relief.
-    pending: Option<(u64, Room, f32)>,
+    pending: Option<Pending>,
+}
+
+/// A choice whose counts are on their way.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    number: u64,
+    room: Room,
+    relief: f32,
+    has_occluders: bool,
 }
 
 const WAITING: u8 = 0;
@@ -159,7 +169,13 @@ impl ClusterSelection {
             encoded: 0,
             placements: 0,
             counted: 0,
-            counts: ClusterCounts { triangles: 0, clusters: 0, is_complete: true, relief: 1.0 },
+            counts: ClusterCounts {
+                triangles: 0,
+                clusters: 0,
+                is_complete: true,
+                has_occluders: false,
+                relief: 1.0,
+            },
         }
     }
 
@@ -291,7 +307,8 @@ impl ClusterSelection {
             encoder.map_buffer_on_submit(&slot.readback, MapMode::Read, .., move |result| {
                 state.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
             });
-            slot.pending = Some((self.encoded, room, relief));
+            let (number, has_occluders) = (self.encoded, occluders.is_some());
+            slot.pending = Some(Pending { number, room, relief, has_occluders });
         }
         Ok(())
     }
@@ -347,7 +364,8 @@ impl ClusterSelection {
     /// Takes in the counts that have come back, and makes room where there was too little.
     fn collect(&mut self) {
         for slot in &mut self.slots {
-            let Some((number, room, relief)) = slot.pending else { continue };
+            let Some(pending) = slot.pending else { continue };
+            let Pending { number, room, relief, has_occluders } = pending;
             match slot.state.load(Ordering::Acquire) {
                 WAITING if Arc::strong_count(&slot.state) > 1 => continue,
                 MAPPED => {
@@ -368,6 +386,7 @@ impl ClusterSelection {
                             triangles: u64::from(triangles),
                             clusters: u64::from(chosen),
                             is_complete,
+                            has_occluders,
                             relief,
                         };
                         // What was cut off would have needed more yet, so room grows by steps.
