@@ -360,13 +360,14 @@ fn animations_play() {
     playing.is_unlike(&begin, 0.5);
 }
 
-/// Two thousand frames later as much memory is in use as before.
+/// Two thousand frames later as much memory is in use as before. What the allocator keeps for a thread
+/// may come on top once, on a busy machine 14 MB of 174; kilobytes a frame would be more.
 #[needs(gpu, window)]
 #[test]
 fn memory_stays_flat() {
     let script = "size 300 300\npanel controls off\nresolution 0.2\ncount-errors off\n\
                   technique lispsm+z2:pcf3@128\nwait 200 turns\nnote-memory\n\
-                  wait 2000 turns\ncheck-memory 5%\nshoot window\n";
+                  wait 2000 turns\ncheck-memory 10%\nshoot window\n";
     let run = Windows::new("memory_stays_flat").script("pole", script);
     let noted: Vec<&str> = run.stderr.lines().filter(|l| l.contains("Memory {")).collect();
     assert_eq!(noted.len(), 2, "{}", run.stderr);

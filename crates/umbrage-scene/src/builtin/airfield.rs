@@ -15,7 +15,7 @@ const PLANES_IN_LINE: u32 = 8;
 const SHORT_LINES: u32 = 4000;
 
 /// `size` planes, of some 9000 triangles each, in lines before hangars, a tower and a runway, after
-/// the airplanes of Zhang et al. 2009 (W&P): thin wings, struts, wires and propellers over long
+/// the airplanes of Lloyd et al. 2006: thin wings, struts, wires and propellers over long
 /// flat ground.
 pub(super) fn airfield(size: u32) -> Scene {
     let mut stage = Stage::new("airfield");
