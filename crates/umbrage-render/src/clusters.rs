@@ -1,6 +1,7 @@
 //! Scenes as clusters of triangles, from which maps and pictures take what they can tell.
 
-use crate::renderer::{PipelineParts, Pipelines, shader_text};
+use crate::pipelines::{PipelineParts, Pipelines};
+use crate::renderer::shader_text;
 use crate::scene::{SceneBuffers, anchor};
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};

@@ -16,6 +16,7 @@ mod gpu;
 mod instances;
 mod map_picture;
 mod overlay;
+mod pipelines;
 mod points;
 mod renderer;
 mod samples;

@@ -3,6 +3,7 @@ use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::map_picture::MapPicture;
 use crate::overlay::OverlayUniform;
+use crate::pipelines::{PipelineParts, Pipelines};
 use crate::points::Points;
 use crate::scene::SceneBuffers;
 use crate::timer::{Stage, Timer};
@@ -13,19 +14,17 @@ use std::collections::HashMap;
 use std::mem::size_of;
 use umbrage::{Camera, Light, Plan, SeenTiles};
 use umbrage_wgpu::{
-    Bias, CasterInstance, Casters, ClusterCasters, ClusterSelection, DEPTH_FORMAT, DepthProjection,
-    Frame, Mask, MeshCasters, MeshKind, SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
+    Bias, CasterInstance, Casters, ClusterCasters, ClusterSelection, DepthProjection, Frame, Mask,
+    MeshCasters, MeshKind, SeenReadback, ShadowOptions, Shadows, Support, Timestamps,
 };
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, ColorTargetState, CommandEncoder, CompareFunction, DepthStencilState, FragmentState,
-    IndexFormat, LoadOp, Operations, PipelineCompilationOptions, PipelineLayout,
-    PipelineLayoutDescriptor, PrimitiveState, RenderPass, RenderPassColorAttachment,
+    Color, CommandEncoder, CompareFunction, IndexFormat, LoadOp, Operations, PipelineLayout,
+    PipelineLayoutDescriptor, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites,
-    RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, StoreOp, TextureFormat, TextureView, VertexAttribute, VertexBufferLayout,
-    VertexFormat, VertexState, VertexStepMode,
+    RenderPipeline, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages, StoreOp,
+    TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode,
 };
 
 use wgpu_profiler::GpuProfilerQuery;
@@ -520,14 +519,14 @@ impl<'g> Renderer<'g> {
             };
             let seeks = target.is_frame && hiding.is_sought;
             let again = picture.draw_again(queue, geometry, eye).filter(|_| seeks);
-            let hides = again.is_some();
+            let mut hides = None;
             if let Some(group) = again {
                 draw_depths(encoder, picture, group);
                 let projection = depth_projection(scene, camera)?;
                 let depth = target.depth;
                 occluders.encode(device, queue, encoder, geometry, depth, projection, &view)?;
+                hides = Some(&*occluders);
             }
-            let hides = hides.then_some(&*occluders);
             let (views, together) = ([view], own.opaque);
             picture
                 .encode(device, queue, encoder, geometry, &views, eye, together, hides, times)?;
@@ -669,17 +668,6 @@ pub(crate) struct Target<'a> {
     pub(crate) pipelines: &'a Pipelines,
 }
 
-/// The pipelines that draw a picture.
-#[derive(Clone)]
-pub(crate) struct Pipelines {
-    /// For meshes without holes. Its fragment stage does not discard, so the device tests depth
-    /// first and shades no fragment that is hidden by what is already drawn.
-    opaque: RenderPipeline,
-    /// For meshes with holes.
-    masked: RenderPipeline,
-    sky: RenderPipeline,
-}
-
 /// Draws meshes into a pass. The vertex buffers are set once.
 struct Drawer<'a, 'p, 'e> {
     scene: &'a SceneBuffers,
@@ -742,82 +730,6 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 /// The forward shader, after the lookup module that it calls.
 pub(crate) fn shader_text(lookup: &str) -> String {
     [lookup, include_str!("wgsl/forward.wgsl"), include_str!("wgsl/overlay.wgsl")].join("\n")
-}
-
-/// What pipelines of pictures have in common.
-pub(crate) struct PipelineParts<'a> {
-    pub(crate) gpu: &'a Gpu,
-    pub(crate) module: &'a ShaderModule,
-    pub(crate) layout: &'a PipelineLayout,
-    /// The vertex stage of meshes, and its buffers.
-    pub(crate) vertex: &'static str,
-    pub(crate) buffers: &'a [Option<VertexBufferLayout<'a>>],
-}
-
-impl PipelineParts<'_> {
-    /// The pipelines with the fragment shaders `opaque_NAME`, `masked_NAME` and `sky_NAME`.
-    /// Fragments of meshes without holes are shaded where their depth compares so. Depth is
-    /// reversed.
-    pub(crate) fn pipelines(
-        &self,
-        name: &str,
-        formats: &[TextureFormat],
-        compare: CompareFunction,
-    ) -> Pipelines {
-        let targets: Vec<_> = formats.iter().map(|&f| Some(ColorTargetState::from(f))).collect();
-        let pipeline = |vertex, what: &str, buffers, compare| {
-            let fragment = format!("{what}_{name}");
-            self.pipeline(vertex, Some((&fragment, &targets)), buffers, compare)
-        };
-        Pipelines {
-            opaque: pipeline(self.vertex, "opaque", self.buffers, compare),
-            masked: pipeline(self.vertex, "masked", self.buffers, CompareFunction::Greater),
-            sky: pipeline("sky_vertex", "sky", &[], CompareFunction::GreaterEqual),
-        }
-    }
-
-    /// A pipeline that draws depths alone, by this vertex stage.
-    pub(crate) fn depths(&self, vertex: &str) -> RenderPipeline {
-        self.pipeline(vertex, None, &[], CompareFunction::Greater)
-    }
-
-    fn pipeline(
-        &self,
-        vertex: &str,
-        fragment: Option<(&str, &[Option<ColorTargetState>])>,
-        buffers: &[Option<VertexBufferLayout<'_>>],
-        compare: CompareFunction,
-    ) -> RenderPipeline {
-        let Self { gpu, module, layout, .. } = self;
-        gpu.device().create_render_pipeline(&RenderPipelineDescriptor {
-            label: Some(fragment.map_or(vertex, |(name, _)| name)),
-            layout: Some(layout),
-            vertex: VertexState {
-                module,
-                entry_point: Some(vertex),
-                compilation_options: PipelineCompilationOptions::default(),
-                buffers,
-            },
-            // Both sides of every surface are visible.
-            primitive: PrimitiveState::default(),
-            depth_stencil: Some(DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(compare),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState::default(),
-            fragment: fragment.map(|(name, targets)| FragmentState {
-                module,
-                entry_point: Some(name),
-                compilation_options: PipelineCompilationOptions::default(),
-                targets,
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
-    }
 }
 
 fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {

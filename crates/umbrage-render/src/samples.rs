@@ -1,7 +1,8 @@
 //! Samples of a picture, read back from the GPU to be measured.
 
 use crate::clusters::{FRAME_SHARE_PX, SAMPLE_SHARE_PX};
-use crate::renderer::{Drawn, Pipelines, Renderer, Shading, Target};
+use crate::pipelines::Pipelines;
+use crate::renderer::{Drawn, Renderer, Shading, Target};
 use crate::view::Tile;
 use crate::{Error, Gpu};
 use glam::{Vec2, Vec3, Vec4};

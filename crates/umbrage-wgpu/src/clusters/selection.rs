@@ -5,7 +5,6 @@ use super::view::ClusterView;
 use crate::{Error, Support};
 use glam::DVec3;
 use std::mem::size_of;
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use wgpu::{
@@ -412,11 +411,6 @@ impl ClusterSelection {
             }
             slot.pending = None;
         }
-    }
-
-    /// The draws of all views together.
-    pub fn draws(&self) -> Range<u32> {
-        0..self.draws
     }
 }
 
