@@ -72,6 +72,7 @@ mod data;
 mod error;
 mod passes;
 mod prefilter;
+mod readback;
 mod redraw;
 mod seen;
 mod shadows;

@@ -1,19 +1,18 @@
 //! What the camera saw, from the viewer's depth buffer.
 
+use crate::readback::Readback;
 use crate::{Error, Support, wgsl};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec2, Vec2, Vec4};
 use std::mem::size_of;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
 use umbrage::{Camera, SeenTile, SeenTiles};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline,
-    ComputePipelineDescriptor, Device, MapMode, PipelineCompilationOptions,
-    PipelineLayoutDescriptor, PollType, Queue, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    TextureFormat, TextureSampleType, TextureUsages, TextureView, TextureViewDimension,
+    ComputePipelineDescriptor, Device, PipelineCompilationOptions, PipelineLayoutDescriptor,
+    PollType, Queue, ShaderModuleDescriptor, ShaderSource, ShaderStages, TextureFormat,
+    TextureSampleType, TextureUsages, TextureView, TextureViewDimension,
 };
 
 /// How the depths of a depth buffer follow from distances along the view direction: depth =
@@ -163,17 +162,10 @@ const TILES: u64 = (SeenTiles::ACROSS * SeenTiles::DOWN) as u64;
 #[derive(Debug)]
 struct Slot {
     picture: Buffer,
-    readback: Buffer,
+    readback: Readback<Pending>,
     /// The depths that were reduced last, with their bind group.
     bound: Option<(TextureView, BindGroup)>,
-    /// One of the states below. The callback of the mapping has the other reference.
-    state: Arc<AtomicU8>,
-    pending: Option<Pending>,
 }
-
-const WAITING: u8 = 0;
-const MAPPED: u8 = 1;
-const FAILED: u8 = 2;
 
 #[derive(Clone, Copy, Debug)]
 struct Pending {
@@ -253,10 +245,8 @@ impl SeenReadback {
                 size_of::<Picture>() as u64,
                 BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             ),
-            readback: buffer(bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+            readback: Readback::new(device, "seen tiles", bytes),
             bound: None,
-            state: Arc::default(),
-            pending: None,
         });
         let tiles = buffer(bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
         Ok(Self { layouts, pipelines, tiles, slots, frame: 0, seen_frame: 0, seen: None })
@@ -286,7 +276,7 @@ impl SeenReadback {
         projection.check(camera)?;
         check_depths(depth, camera.image())?;
         self.collect();
-        let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) else {
+        let Some(slot) = self.slots.iter_mut().find(|s| s.readback.is_free()) else {
             return Ok(());
         };
         let is_multisampled = usize::from(depth.texture().sample_count() > 1);
@@ -319,17 +309,10 @@ impl SeenReadback {
             pass.set_bind_group(0, slot.bound.as_ref().map(|(_, group)| group), &[]);
             pass.dispatch_workgroups(SeenTiles::ACROSS, SeenTiles::DOWN, 1);
         }
-        encoder.copy_buffer_to_buffer(&self.tiles, 0, &slot.readback, 0, slot.readback.size());
-        slot.state.store(WAITING, Ordering::Release);
-        let state = Arc::clone(&slot.state);
-        // The mapping begins when the commands are submitted, so tiles never come from another
-        // frame than the one whose camera is kept here.
-        encoder.map_buffer_on_submit(&slot.readback, MapMode::Read, .., move |result| {
-            state.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
-        });
         self.frame += 1;
         let format = depth.texture().format();
-        slot.pending = Some(Pending { frame: self.frame, camera: *camera, projection, format });
+        let known = Pending { frame: self.frame, camera: *camera, projection, format };
+        slot.readback.send(encoder, &self.tiles, known);
         Ok(())
     }
 
@@ -346,27 +329,17 @@ impl SeenReadback {
     fn collect(&mut self) {
         let Self { slots, seen, seen_frame, .. } = self;
         for slot in slots {
-            let Some(pending) = slot.pending else { continue };
-            match slot.state.load(Ordering::Acquire) {
-                // The commands may still be submitted, or the encoder was dropped, and the callback
-                // with it.
-                WAITING if Arc::strong_count(&slot.state) > 1 => continue,
-                MAPPED => {
-                    if pending.frame > *seen_frame
-                        && let Ok(bytes) = slot.readback.get_mapped_range(..)
-                    {
-                        let tiles: &[Tile] = bytemuck::cast_slice(&bytes);
-                        let seen = seen.get_or_insert_with(|| SeenTiles::new(&pending.camera));
-                        let tile = |index: usize| pending.tile(&tiles[index]);
-                        if seen.set(&pending.camera, tile).is_ok() {
-                            *seen_frame = pending.frame;
-                        }
-                    }
-                    slot.readback.unmap();
+            slot.readback.receive(|pending, bytes| {
+                if pending.frame <= *seen_frame {
+                    return;
                 }
-                _ => {}
-            }
-            slot.pending = None;
+                let tiles: &[Tile] = bytemuck::cast_slice(bytes);
+                let seen = seen.get_or_insert_with(|| SeenTiles::new(&pending.camera));
+                let tile = |index: usize| pending.tile(&tiles[index]);
+                if seen.set(&pending.camera, tile).is_ok() {
+                    *seen_frame = pending.frame;
+                }
+            });
         }
     }
 }

@@ -2,15 +2,14 @@ use super::data::{self, Descent, Drawing, Indexing, Item, Origin, Span};
 use super::geometry::{ClusterGeometry, buffer};
 use super::occluders::ClusterOccluders;
 use super::view::ClusterView;
+use crate::readback::Readback;
 use crate::{Error, Support};
 use glam::DVec3;
 use std::mem::size_of;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
     BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
-    ComputePassTimestampWrites, Device, IndexFormat, MapMode, PollType, Queue, RenderPass,
+    ComputePassTimestampWrites, Device, IndexFormat, PollType, Queue, RenderPass,
 };
 
 /// The most rounds of a descent: eight to the power of these is more than there can be instances
@@ -36,7 +35,7 @@ pub struct ClusterSelection {
     alignment: u32,
     buffers: Option<Buffers>,
     draws: u32,
-    slots: Vec<Slot>,
+    slots: [Readback<Pending>; 3],
     /// How often something was chosen, and how often when the newest counts were made.
     encoded: u64,
     /// The placements of instances for which something was chosen last.
@@ -107,14 +106,6 @@ struct Sizes {
     spans: usize,
 }
 
-/// A way back for counts.
-#[derive(Debug)]
-struct Slot {
-    readback: Buffer,
-    state: Arc<AtomicU8>,
-    pending: Option<Pending>,
-}
-
 /// A choice whose counts are on their way.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
@@ -124,26 +115,13 @@ struct Pending {
     has_occluders: bool,
 }
 
-const WAITING: u8 = 0;
-const MAPPED: u8 = 1;
-const FAILED: u8 = 2;
-
 /// Words of the counts that come back.
-const COUNTED: u64 = data::DRAWS as u64;
+const COUNTED: usize = data::DRAWS;
 
 impl ClusterSelection {
     /// A selection that has not chosen anything.
     pub fn new(device: &Device, support: &Support, geometry: &ClusterGeometry) -> Self {
-        let slots = (0..3).map(|_| Slot {
-            readback: device.create_buffer(&BufferDescriptor {
-                label: Some("shadow cluster counts"),
-                size: COUNTED * 4,
-                usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
-            state: Arc::new(AtomicU8::new(WAITING)),
-            pending: None,
-        });
+        let readback = || Readback::new(device, "shadow cluster counts", 4 * COUNTED as u64);
         // Scenes of millions of triangles rarely show more; for others that is all there is.
         let triangles = geometry.most_triangles.clamp(1 << 12, 1 << 21) as u32;
         let limits = device.limits();
@@ -164,7 +142,7 @@ impl ClusterSelection {
             alignment: support.uniform_alignment,
             buffers: None,
             draws: 0,
-            slots: slots.collect(),
+            slots: [(); 3].map(|()| readback()),
             encoded: 0,
             placements: 0,
             counted: 0,
@@ -299,15 +277,9 @@ impl ClusterSelection {
         }
         self.encoded += 1;
         self.placements = geometry.placements;
-        if let Some(slot) = self.slots.iter_mut().find(|s| s.pending.is_none()) {
-            encoder.copy_buffer_to_buffer(&buffers.counts, 0, &slot.readback, 0, COUNTED * 4);
-            slot.state.store(WAITING, Ordering::Release);
-            let state = Arc::clone(&slot.state);
-            encoder.map_buffer_on_submit(&slot.readback, MapMode::Read, .., move |result| {
-                state.store(if result.is_ok() { MAPPED } else { FAILED }, Ordering::Release);
-            });
+        if let Some(slot) = self.slots.iter_mut().find(|slot| slot.is_free()) {
             let (number, has_occluders) = (self.encoded, occluders.is_some());
-            slot.pending = Some(Pending { number, room, relief, has_occluders });
+            slot.send(encoder, &buffers.counts, Pending { number, room, relief, has_occluders });
         }
         Ok(())
     }
@@ -360,57 +332,59 @@ impl ClusterSelection {
         self.counted == self.encoded
     }
 
-    /// Takes in the counts that have come back, and makes room where there was too little.
+    /// Takes in the counts that have come back.
     fn collect(&mut self) {
-        for slot in &mut self.slots {
-            let Some(pending) = slot.pending else { continue };
-            let Pending { number, room, relief, has_occluders } = pending;
-            match slot.state.load(Ordering::Acquire) {
-                WAITING if Arc::strong_count(&slot.state) > 1 => continue,
-                MAPPED => {
-                    if number > self.counted
-                        && let Ok(bytes) = slot.readback.get_mapped_range(..)
-                    {
-                        let words: &[u32] = bytemuck::cast_slice(&bytes);
-                        let queue = words[..data::CHOSEN].iter().copied().max().unwrap_or(0);
-                        let chosen = words[data::CHOSEN];
-                        let triangles = words[data::TRIANGLES];
-                        let blocks = words[data::BLOCKS];
-                        let is_complete = queue <= room.queue
-                            && chosen <= room.choices
-                            && triangles <= room.triangles
-                            && blocks <= room.blocks;
-                        self.counted = number;
-                        self.counts = ClusterCounts {
-                            triangles: u64::from(triangles),
-                            clusters: u64::from(chosen),
-                            is_complete,
-                            has_occluders,
-                            relief,
-                        };
-                        // What was cut off would have needed more yet, so room grows by steps.
-                        let grown = |has: u32, needs: u32| {
-                            let half_more = needs.saturating_add(needs / 2);
-                            if needs > has { half_more.max(has) } else { has }
-                        };
-                        let grown = Room {
-                            queue: grown(self.room.queue, queue),
-                            choices: grown(self.room.choices, chosen),
-                            triangles: grown(self.room.triangles, triangles),
-                            blocks: grown(self.room.blocks, blocks),
-                        }
-                        .within(self.most);
-                        if !is_complete && grown == self.room && relief == self.relief {
-                            self.relief *= RELIEF;
-                        }
-                        self.room = grown;
-                    }
-                    slot.readback.unmap();
-                }
-                _ => {}
+        for i in 0..self.slots.len() {
+            let mut received = None;
+            self.slots[i].receive(|pending, bytes| {
+                let mut words = [0; COUNTED];
+                words.copy_from_slice(bytemuck::cast_slice(bytes));
+                received = Some((pending, words));
+            });
+            if let Some((pending, words)) = received {
+                self.learn(pending, &words);
             }
-            slot.pending = None;
         }
+    }
+
+    /// Takes in the counts of a choice, and makes room where there was too little.
+    fn learn(&mut self, pending: Pending, words: &[u32; COUNTED]) {
+        let Pending { number, room, relief, has_occluders } = pending;
+        if number <= self.counted {
+            return;
+        }
+        let queue = words[..data::CHOSEN].iter().copied().max().unwrap_or(0);
+        let chosen = words[data::CHOSEN];
+        let triangles = words[data::TRIANGLES];
+        let blocks = words[data::BLOCKS];
+        let is_complete = queue <= room.queue
+            && chosen <= room.choices
+            && triangles <= room.triangles
+            && blocks <= room.blocks;
+        self.counted = number;
+        self.counts = ClusterCounts {
+            triangles: u64::from(triangles),
+            clusters: u64::from(chosen),
+            is_complete,
+            has_occluders,
+            relief,
+        };
+        // What was cut off would have needed more yet, so room grows by steps.
+        let grown = |has: u32, needs: u32| {
+            let half_more = needs.saturating_add(needs / 2);
+            if needs > has { half_more.max(has) } else { has }
+        };
+        let grown = Room {
+            queue: grown(self.room.queue, queue),
+            choices: grown(self.room.choices, chosen),
+            triangles: grown(self.room.triangles, triangles),
+            blocks: grown(self.room.blocks, blocks),
+        }
+        .within(self.most);
+        if !is_complete && grown == self.room && relief == self.relief {
+            self.relief *= RELIEF;
+        }
+        self.room = grown;
     }
 }
 
