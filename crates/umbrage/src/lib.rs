@@ -10,6 +10,7 @@
 //!   planes to cull its casters with, and the error that it has ([`MapError`]). [`aliasing`] tells
 //!   the error at any point.
 //! - An [`Atlas`] gives every map a place in one texture.
+//! - [`paged`] has maps of which only the pages exist that the camera sees.
 //! - [`visibility`] has the shadow test and its filters, on the CPU.
 //! - [`theory`] has the closed forms of the papers behind it all.
 //!
@@ -43,6 +44,7 @@ mod focus;
 mod light;
 mod math;
 mod matrices;
+pub mod paged;
 mod partition;
 mod plan;
 mod planner;

@@ -1,6 +1,7 @@
 use crate::aliasing::Local;
 use crate::bounds::{Aabb, Plane};
 use crate::error::Error;
+use crate::paged::Paging;
 use crate::visibility::Filter;
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4Swizzles};
 use std::ops::Range;
@@ -30,6 +31,8 @@ pub struct Plan {
     /// Where shadows fade out before the view ends; `None` if they end there without a fade. See
     /// [`Planner::set_fade`](crate::Planner::set_fade).
     pub fade: Option<Fade>,
+    /// How the maps are divided into pages; `None` if they have none.
+    pub paging: Option<Paging>,
 }
 
 /// The fade of all shadows before the far plane of the view, beyond which no map serves any point.
@@ -145,7 +148,12 @@ impl Plan {
         light: usize,
         world_position: DVec3,
     ) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let maps = self.lights.get(light).map_or(0..0, |l| l.maps.clone());
+        let maps = if self.paging.is_some() {
+            let place = self.page_place(light, world_position);
+            place.map_or(0..0, |place| place.map..place.map + 1)
+        } else {
+            self.lights.get(light).map_or(0..0, |l| l.maps.clone())
+        };
         let mut left = 1.0;
         maps.map_while(move |i| {
             (left > 0.0).then(|| {

@@ -4,6 +4,7 @@ use crate::camera::Camera;
 use crate::error::{Error, check};
 use crate::focus::{Body, CellView, frustum_planes, thickened};
 use crate::light::{Light, Projector};
+use crate::paged::Paging;
 use crate::partition::{self, Along};
 use crate::plan::{Fade, Part, Plan, PlannedLight, ShadowMap};
 use crate::resolution::resolutions;
@@ -246,23 +247,20 @@ impl Planner {
         technique.check()?;
         self.limits.check(technique)?;
         bounds.check()?;
+        if let Some(error) = technique.paged_error() {
+            return self.plan_pages(camera, lights, technique, error);
+        }
+        self.plan.paging = None;
         // If this plan fails, the next one keeps nothing.
         let last_view = self.last.view.take();
         let view = View::of(camera, bounds, technique);
         let keeps = view.is_some() && last_view == view;
         if !keeps {
-            self.plan.origin = camera.eye();
-            self.plan.pixel_gradient = camera.pixel_gradient();
-            self.plan.viewer = camera.viewer();
-            self.plan.filter = technique.filter;
+            self.set_view(camera, technique);
             self.last.lights.clear();
             self.focus(camera, bounds);
         }
-        self.plan.fade = (self.fade > 0.0).then(|| Fade {
-            end: Plane { normal: -camera.forward(), offset: camera.far() },
-            // The near plane of an orthographic view may lie behind the eye.
-            length: self.fade * (camera.far() - camera.near().min(0.0)),
-        });
+        self.set_fade_of(camera);
         let frame = Frame { camera, bounds, technique, limits: self.limits };
         std::mem::swap(&mut self.units, &mut self.last.units);
         std::mem::swap(&mut self.sizes, &mut self.last.sizes);
@@ -287,6 +285,44 @@ impl Planner {
         }
         last.view = view;
         Ok(plan)
+    }
+
+    /// Plans the windows of paged maps.
+    fn plan_pages(
+        &mut self,
+        camera: &Camera,
+        lights: &[Light],
+        technique: &Technique,
+        error: f64,
+    ) -> Result<&Plan, Error> {
+        self.forget();
+        self.bodies.view.clear();
+        self.last.lights.clear();
+        for light in lights {
+            let light = light.checked()?;
+            check_light_size(technique, &light)?;
+            self.last.lights.push(light);
+        }
+        self.set_view(camera, technique);
+        self.set_fade_of(camera);
+        Paging::plan(&mut self.plan, camera, &self.last.lights, technique, error)?;
+        Ok(&self.plan)
+    }
+
+    /// Sets what a plan has of its view.
+    fn set_view(&mut self, camera: &Camera, technique: &Technique) {
+        self.plan.origin = camera.eye();
+        self.plan.pixel_gradient = camera.pixel_gradient();
+        self.plan.viewer = camera.viewer();
+        self.plan.filter = technique.filter;
+    }
+
+    fn set_fade_of(&mut self, camera: &Camera) {
+        self.plan.fade = (self.fade > 0.0).then(|| Fade {
+            end: Plane { normal: -camera.forward(), offset: camera.far() },
+            // The near plane of an orthographic view may lie behind the eye.
+            length: self.fade * (camera.far() - camera.near().min(0.0)),
+        });
     }
 
     /// Drafts the maps of one light, or keeps those of the last plan if nothing has changed.

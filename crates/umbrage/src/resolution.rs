@@ -53,6 +53,8 @@ pub(crate) fn resolutions(
                 sizes.push(if is_empty(unit) { [0; 2] } else { limits.at_least(*unit, error)? });
             }
         }
+        // The check of the technique leaves this size to pages, which no map is made for.
+        Size::Needed => {}
     }
     Ok(())
 }

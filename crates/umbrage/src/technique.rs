@@ -9,6 +9,7 @@ mod layouts;
 mod scale;
 
 use crate::error::{Error, check};
+use crate::paged::{LEAST_BUDGET, LEAST_ERROR, MOST_ERROR};
 use crate::plan::Face;
 use crate::visibility::Filter;
 
@@ -79,7 +80,7 @@ impl Default for Limits {
 }
 
 /// What a map covers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Cover {
     /// The receivers that the camera sees in the map's part of the view.
     #[default]
@@ -95,6 +96,18 @@ pub enum Cover {
     /// Only for [`Warp::Uniform`], neither with partitions by face nor with [`Splits::Fitted`]. A
     /// stable map has at least 2 × 2 texels.
     Stable,
+    /// Even maps whose texels are a power of two wide and keep their places in the world, of which
+    /// only those [pages](crate::paged) exist that the camera sees. Each receiver is looked up in
+    /// the coarsest map whose texels are no wider than `error` pixels there.
+    ///
+    /// Only for [`Warp::Uniform`], without a partition, and with filters that are no prefilters.
+    /// The size is [`Size::Needed`], or a [`Size::Budget`] that the pages share.
+    Paged {
+        /// The greatest width of a texel across the light, pixels,
+        /// [`LEAST_ERROR`](crate::paged::LEAST_ERROR) ..=
+        /// [`MOST_ERROR`](crate::paged::MOST_ERROR).
+        error: f64,
+    },
 }
 
 impl Cover {
@@ -266,6 +279,8 @@ pub enum Size {
     /// The fewest texels with which no map's largest error in the worst direction exceeds this many
     /// pixels per texel, > 0. An error of 1 gives the critical resolution.
     MaxError(f64),
+    /// As many pages as the view needs. Only for [`Cover::Paged`], which has an error of its own.
+    Needed,
 }
 
 impl Technique {
@@ -289,6 +304,11 @@ impl Technique {
                     format!("must be an error of more than 0 pixels per texel, is {pixels}")
                 })?;
             }
+            Size::Needed => {
+                check(matches!(self.cover, Cover::Paged { .. }), "technique.size", || {
+                    "must be given but for paged maps, which have what the view needs".into()
+                })?;
+            }
         }
         match self.warp {
             Warp::Lambda(lambda) => check(lambda > 0.0, "technique.warp.lambda", || {
@@ -305,6 +325,9 @@ impl Technique {
             "only maps that are not warped can cover more than the receivers seen: take Warp::Uniform"
                 .into()
         })?;
+        if let Cover::Paged { error } = self.cover {
+            self.check_paged(error)?;
+        }
         if self.cover == Cover::Stable {
             check(self.partition.faces == Faces::Whole, "technique.partition.faces", || {
                 "stable maps do not turn with the view: they cannot serve its faces".into()
@@ -319,6 +342,29 @@ impl Technique {
         }
         self.partition.check()?;
         self.filter.check()
+    }
+
+    fn check_paged(&self, error: f64) -> Result<(), Error> {
+        check((LEAST_ERROR..=MOST_ERROR).contains(&error), "technique.cover", || {
+            format!("must have an error of {LEAST_ERROR} to {MOST_ERROR} pixels, is {error}")
+        })?;
+        check(self.partition == Partition::default(), "technique.partition", || {
+            "paged maps choose a level at each receiver: they have no slices and no faces".into()
+        })?;
+        check(self.filter.prefilter().is_none(), "technique.filter", || {
+            "pages have no prefilters: take hard, pcfN or pcss".into()
+        })?;
+        let is_size = match self.size {
+            Size::Budget(texels) => texels >= LEAST_BUDGET,
+            Size::Needed => true,
+            Size::Exact(_) | Size::MaxError(_) => false,
+        };
+        check(is_size, "technique.size", || {
+            format!(
+                "pages share a budget of at least {LEAST_BUDGET} texels, as @512, or have what the \
+                 view needs; paged(error=1) limits the width of texels"
+            )
+        })
     }
 }
 

@@ -87,7 +87,7 @@ fn size_code(size: Size) -> String {
             side if side * side == texels => format!("Size::Budget({side} * {side})"),
             _ => format!("Size::Budget({texels})"),
         },
-        Size::Exact(_) | Size::MaxError(_) => format!("Size::{size:?}"),
+        Size::Exact(_) | Size::MaxError(_) | Size::Needed => format!("Size::{size:?}"),
     }
 }
 

@@ -24,7 +24,7 @@
 pub use super::completion::{Completion, complete};
 pub use super::edits::{Slot, with_option, with_word, written};
 pub use super::scale::Scale;
-use super::{Size, Technique, filters, layouts};
+use super::{Cover, Size, Technique, filters, layouts};
 use crate::visibility::Filter;
 use std::fmt::{self, Display, LowerExp, Write};
 use std::ops::RangeInclusive;
@@ -252,12 +252,13 @@ impl FromStr for Technique {
         }
         let default = Self::default();
         let (warp, cover) = warp.map_or(Ok((default.warp, default.cover)), layouts::read_warp)?;
+        let default_size = Size::default_for(cover);
         Ok(Self {
             warp,
             cover,
             partition: layouts::read_partition(&partitions)?,
             filter: filter.map_or(Ok(default.filter), filters::read)?,
-            size: size.map_or(Ok(default.size), layouts::read_size)?,
+            size: size.map_or(Ok(default_size), layouts::read_size)?,
         })
     }
 }
@@ -274,10 +275,17 @@ impl Display for Technique {
         if self.filter != default.filter {
             write!(f, ":{}", self.filter)?;
         }
-        if self.size != default.size {
+        if self.size != Size::default_for(self.cover) {
             write!(f, "@{}", self.size)?;
         }
         Ok(())
+    }
+}
+
+impl Size {
+    /// The size that need not be written.
+    fn default_for(cover: Cover) -> Self {
+        if matches!(cover, Cover::Paged { .. }) { Self::Needed } else { Technique::default().size }
     }
 }
 
@@ -525,6 +533,8 @@ impl Display for Size {
             },
             Self::Exact([width, height]) => write!(f, "{width}x{height}"),
             Self::MaxError(pixels) => write!(f, "{}px", Short(pixels)),
+            // No text has it: it is what is meant where there is none.
+            Self::Needed => f.write_str("needed"),
         }
     }
 }

@@ -5,6 +5,7 @@ use super::language::{
 };
 use super::scale::Scale;
 use super::{Cover, Faces, MAX_SIDE, Objective, Partition, Size, Splits, Warp};
+use crate::paged::{LEAST_ERROR, MOST_ERROR};
 use std::fmt::{self, Write};
 use std::str::FromStr;
 
@@ -101,7 +102,30 @@ pub(super) const WARPS: &[Word] = &[
         meaning: "A perspective warp with this distance λ, metres, from its centre of projection to \
                   its near plane.",
     },
+    Word {
+        name: PAGED,
+        value: "",
+        scales: &[],
+        example: PAGED,
+        options: &[WordOption {
+            name: "error",
+            value: "PIXELS",
+            scales: &[Scale::ratios("", LEAST_ERROR, MOST_ERROR)],
+            example: "error=0.5",
+            meaning: "The greatest width of a texel, pixels, before any surface's slope; 1 if none is \
+                      given.",
+        }],
+        meaning: "Pages of even maps, whose texels are nowhere wider than asked and keep their places \
+                  in the world, so that shadows do not shimmer. Without @TEXELS there are as many \
+                  as the view needs.",
+    },
 ];
+
+/// The word of paged maps.
+const PAGED: &str = "paged";
+
+/// The error of paged maps that need not be written, pixels.
+const PAGED_ERROR: f64 = 1.0;
 
 pub(super) const PARTITIONS: &[Word] = &[
     Word {
@@ -219,6 +243,13 @@ pub(super) fn read_warp(text: &str) -> Result<(Warp, Cover), ParseError> {
         "adaptive" if written.has("area") => seen(Warp::Adaptive(Objective::Area)),
         "adaptive" => seen(Warp::Adaptive(Objective::Storage)),
         "log" => seen(Warp::Log),
+        PAGED => {
+            let pixels =
+                format!("a number of {LEAST_ERROR} to {MOST_ERROR} pixels, as in `error=0.5`");
+            let is_good = |e: &f64| (LEAST_ERROR..=MOST_ERROR).contains(e);
+            let error = written.number("error", is_good, pixels)?.unwrap_or(PAGED_ERROR);
+            Ok((Warp::Uniform, Cover::Paged { error }))
+        }
         "lambda" => match written.value.parse() {
             Ok(lambda) if lambda > 0.0 => seen(Warp::Lambda(lambda)),
             _ => Err(ParseError::new(format!(
@@ -279,6 +310,7 @@ pub(super) fn write_warp(f: &mut impl Write, warp: Warp, cover: Cover) -> fmt::R
     };
     let head = match warp {
         Warp::Uniform if cover == Cover::Scene => "unfocused".to_owned(),
+        Warp::Uniform if matches!(cover, Cover::Paged { .. }) => PAGED.to_owned(),
         Warp::Uniform => "uniform".to_owned(),
         Warp::Psm => "psm".to_owned(),
         Warp::Lispsm => "lispsm".to_owned(),
@@ -287,10 +319,12 @@ pub(super) fn write_warp(f: &mut impl Write, warp: Warp, cover: Cover) -> fmt::R
         Warp::Log => "log".to_owned(),
         Warp::Lambda(metres) => format!("lambda={}", Short(metres)),
     };
-    // The language has no word for warped maps that cover the whole scene, and the planner rejects
-    // them.
+    // The language has no words for warped maps that cover the whole scene or have pages, and the
+    // planner rejects them.
     let cover = match cover {
         Cover::Stable => Some("stable".to_owned()),
+        Cover::Paged { .. } if warp != Warp::Uniform => Some(PAGED.to_owned()),
+        Cover::Paged { error } => (error != PAGED_ERROR).then(|| format!("error={}", Short(error))),
         Cover::Scene if warp != Warp::Uniform => Some("unfocused".to_owned()),
         Cover::Scene | Cover::Seen => None,
     };
