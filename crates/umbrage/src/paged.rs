@@ -23,6 +23,10 @@
 //!
 //! [`bias`]: Paging::bias
 //!
+//! Where a page is missing because there are more wanted than there is room for, the next coarser
+//! one is looked up. With every page that is wanted comes one that is [`FALLBACK_LEVELS`] coarser,
+//! so that there always is one.
+//!
 //! # Tables
 //! All receivers of a level lie near the viewer. With the sine of half a pixel's angle neglected, a
 //! pixel is z/f metres wide at the distance z along the view, where f is the focal length in
@@ -70,6 +74,9 @@ pub const LEAST_BUDGET: u64 = 512 * 512;
 
 /// The largest bias of levels. With it texels are 64 times as wide as asked for.
 pub const MOST_BIAS: f64 = 6.0;
+
+/// The levels by which the page that stands in for a missing one is coarser.
+pub const FALLBACK_LEVELS: i32 = 4;
 
 /// The most pages across a window.
 const MOST_SIDE: f64 = 1024.0;
@@ -245,6 +252,7 @@ impl Paging {
         for (index, (map, level)) in plan.maps.iter_mut().zip(&levels).enumerate() {
             let grid: &Grid = &grids[level.grid];
             grid.projection.set_map(map, camera.eye(), level, reach);
+            grid.projection.set_cell(map, camera);
             map.part = grid.part(level.level);
             map.split = grid.projection.split(camera, error, level.level);
             map.error = MapError::new([error; 2], error);
@@ -256,6 +264,11 @@ impl Paging {
 }
 
 impl Grid {
+    /// The coarsest level.
+    pub fn last_level(&self) -> i32 {
+        self.first_level + (self.maps.len() / self.slabs) as i32 - 1
+    }
+
     /// Which part of the view a level serves.
     fn part(&self, level: i32) -> Part {
         let slice = (level - self.first_level) as usize;
@@ -285,10 +298,9 @@ impl Plan {
         let (index, grid, seen) = grids.find_map(|(index, grid)| {
             Some((index, grid, grid.projection.project(world_position)?))
         })?;
-        let last_level = grid.first_level + (grid.maps.len() / grid.slabs) as i32 - 1;
         let ratio = allowed / seen.w;
         let finest = if ratio > 0.0 { floor_log2(ratio) } else { grid.first_level };
-        let level = finest.clamp(grid.first_level, last_level);
+        let level = finest.clamp(grid.first_level, grid.last_level());
         let map = grid.maps.start + (level - grid.first_level) as usize * grid.slabs;
         let width = page_width(level);
         let [i, j] = [seen.plane.x, seen.plane.y].map(|x| (x / width).floor());
@@ -302,6 +314,18 @@ impl Plan {
             .all(|(page, first)| (0..i64::from(window.side)).contains(&(page - first)));
         let texel = (seen.plane / width - DVec2::new(i, j)) * f64::from(PAGE_TEXELS);
         is_inside.then_some(PagePlace { map: map + slab_offset, page, texel })
+    }
+
+    /// The page that is looked up where the one at a place is missing, [`FALLBACK_LEVELS`] coarser
+    /// or on the coarsest level. It holds all of that page, and belongs to the slab of the world
+    /// position.
+    pub fn fallback_page(&self, place: &PagePlace, world_position: DVec3) -> Option<Page> {
+        let grid = self.paging.as_ref()?.grids.get(place.page.grid)?;
+        let level = (place.page.level + FALLBACK_LEVELS).min(grid.last_level());
+        let coarser = level - place.page.level;
+        let slab = grid.projection.slab(world_position, level);
+        let [i, j] = [place.page.i, place.page.j].map(|index| index >> coarser);
+        Some(Page { level, slab, i, j, ..place.page })
     }
 
     /// The map of one page, whose matrix follows from the page's address and the light alone. Its

@@ -9,14 +9,22 @@ use std::collections::BTreeSet;
 const STEP: f64 = 1.0 / 64.0;
 
 impl Plan {
-    /// The pages that receivers at these world positions want under a light.
+    /// The pages that receivers at these world positions want under a light, and those that stand
+    /// in for them ([`fallback_page`](Self::fallback_page)).
     pub fn wanted_pages<'a>(
         &self,
         light: usize,
         world_positions: impl IntoIterator<Item = &'a DVec3>,
     ) -> BTreeSet<Page> {
-        let pages = world_positions.into_iter().map(|&p| self.page_place(light, p));
-        pages.flatten().map(|place| place.page).collect()
+        let mut pages = BTreeSet::new();
+        for &position in world_positions {
+            if let Some(place) = self.page_place(light, position) {
+                if pages.insert(place.page) {
+                    pages.extend(self.fallback_page(&place, position));
+                }
+            }
+        }
+        pages
     }
 
     /// Sets the [bias](super::Paging::bias) to the least multiple of 1/64 with which all lights'

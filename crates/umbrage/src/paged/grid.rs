@@ -161,6 +161,22 @@ impl Projection {
         [begin, 2.0 * begin].map(|z| z.clamp(whole[0], whole[1]))
     }
 
+    /// Sets the half-spaces that hold all receivers of a grid, relative to the camera's eye.
+    pub(super) fn set_cell(&self, map: &mut ShadowMap, camera: &Camera) {
+        let far = camera.far() * (1.0 + ROUNDING);
+        map.cell.clear();
+        map.cell.push(Plane { normal: -camera.forward(), offset: far });
+        let Some(lamp) = self.lamp else { return };
+        let apex = lamp.position - camera.eye();
+        let slack = ROUNDING * lamp.range;
+        for axis in [self.x, -self.x, self.z, -self.z] {
+            let plane = Plane::through(apex, (self.along * lamp.slope + axis).normalize());
+            map.cell.push(Plane { offset: plane.offset + slack, ..plane });
+        }
+        let end = apex + self.along * (lamp.range + slack);
+        map.cell.push(Plane::through(end, -self.along));
+    }
+
     /// The world position that a page's own map is relative to.
     pub(super) fn page_origin(&self, page: &Page) -> DVec3 {
         if let Some(lamp) = self.lamp {
