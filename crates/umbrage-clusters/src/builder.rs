@@ -1,6 +1,6 @@
 //! Clusters from meshes.
 
-use crate::levels::levels;
+use crate::levels::{finest, levels};
 use crate::part::Source;
 use crate::{ClusterMesh, Error, MeshInput};
 use rayon::prelude::*;
@@ -27,6 +27,24 @@ pub fn build_all(
     meshes: &[MeshInput],
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<ClusterMesh>, Error> {
+    each(meshes, progress, levels)
+}
+
+/// The clusters of many meshes without coarser levels of detail, which takes a small part of the
+/// time. All triangles are drawn from them, but only where they are seen.
+///
+/// # Errors
+///
+/// As for [`build_all`].
+pub fn build_finest(meshes: &[MeshInput]) -> Result<Vec<ClusterMesh>, Error> {
+    each(meshes, &|_| {}, finest)
+}
+
+fn each(
+    meshes: &[MeshInput],
+    progress: &(dyn Fn(u64) + Sync),
+    clusters_of: fn(&Source) -> ClusterMesh,
+) -> Result<Vec<ClusterMesh>, Error> {
     for (i, mesh) in meshes.iter().enumerate() {
         mesh.check().map_err(|error| Error::Mesh { mesh: i, error: Box::new(error) })?;
     }
@@ -38,7 +56,7 @@ pub fn build_all(
         // The next mesh goes to whichever thread is free; `par_iter` would not keep the order.
         .par_bridge()
         .map(|i| {
-            let clusters = levels(&Source::new(&meshes[i]));
+            let clusters = clusters_of(&Source::new(&meshes[i]));
             progress(meshes[i].triangles.len() as u64);
             (i, clusters)
         })

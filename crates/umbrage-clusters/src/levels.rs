@@ -61,6 +61,15 @@ pub(crate) fn levels(source: &Source) -> ClusterMesh {
     builder.result
 }
 
+/// The finest level of a mesh alone.
+pub(crate) fn finest(source: &Source) -> ClusterMesh {
+    let mut builder =
+        Builder { source, result: ClusterMesh::default(), groups: Vec::new(), round: 0 };
+    builder.end(split_mesh(source));
+    builder.result.nodes = tree(&builder.groups);
+    builder.result
+}
+
 impl Builder<'_> {
     /// Halves the triangles again and again until one group has all that is left, or no group gets
     /// on.

@@ -31,7 +31,7 @@ mod split;
 mod tree;
 
 #[cfg(feature = "build")]
-pub use builder::{build, build_all};
+pub use builder::{build, build_all, build_finest};
 pub use check::Flaw;
 pub use file::{FORMAT_VERSION, FileError, read, write};
 pub use input::{Error, MeshInput, fingerprint};

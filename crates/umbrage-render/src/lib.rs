@@ -16,6 +16,7 @@ mod gpu;
 mod instances;
 mod map_picture;
 mod overlay;
+mod pages;
 mod pipelines;
 mod points;
 mod renderer;

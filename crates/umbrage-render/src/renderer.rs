@@ -3,6 +3,7 @@ use crate::frame_target::{FRAME_FORMAT, FrameTarget};
 use crate::instances::{Draw, DrawList, EdgeOn, Instances};
 use crate::map_picture::MapPicture;
 use crate::overlay::OverlayUniform;
+use crate::pages::PageDrawing;
 use crate::pipelines::{PipelineParts, Pipelines};
 use crate::points::Points;
 use crate::scene::SceneBuffers;
@@ -32,14 +33,14 @@ use wgpu_profiler::GpuProfilerQuery;
 /// Draws one scene with one kind of shadow maps.
 pub struct Renderer<'g> {
     pub(crate) gpu: &'g Gpu,
-    scene: &'g SceneBuffers,
+    pub(crate) scene: &'g SceneBuffers,
     pub(crate) shadows: Shadows,
     pub(crate) points: Option<Points>,
     pub(crate) map_picture: Option<MapPicture>,
     opaque: MeshCasters,
     masked: MeshCasters,
     /// One for each material; `None` for opaque materials.
-    masks: Vec<Option<BindGroup>>,
+    pub(crate) masks: Vec<Option<BindGroup>>,
     view_buffer: Buffer,
     pub(crate) overlay_buffer: Buffer,
     view_group: BindGroup,
@@ -50,9 +51,11 @@ pub struct Renderer<'g> {
     instances: Instances,
     /// Draws clusters, if the scene has any and their levels of detail are wanted.
     clusters: Option<ClusterDrawing>,
+    /// Draws pages, if plans have some.
+    pub(crate) pages: Option<PageDrawing>,
     /// Whether each choice of clusters is waited for.
-    is_exact: bool,
-    edge_on: Vec<EdgeOn>,
+    pub(crate) is_exact: bool,
+    pub(crate) edge_on: Vec<EdgeOn>,
     /// Origin of the render space in which the maps are looked up, world space, metres; `None`
     /// before maps are drawn.
     pub(crate) eye: Option<DVec3>,
@@ -131,6 +134,7 @@ impl<'g> Renderer<'g> {
         let device = gpu.device();
         let mut shadows = Shadows::new(device, support, options)?;
         if scene.clusters.is_some() && support.clusters {
+            // Pages too are then drawn from levels of detail.
             shadows.set_bias(ClusterCasters::bias(ClusterCasters::SHARE))?;
         }
         let [positions, instances] = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
@@ -180,6 +184,7 @@ impl<'g> Renderer<'g> {
             bind_group_layouts: &layouts.map(Some),
             immediate_size: 0,
         });
+        let pages = options.pages.then(|| PageDrawing::new(gpu, scene, &shadows)).transpose()?;
         gpu.check()?;
         Ok(Self {
             gpu,
@@ -198,6 +203,7 @@ impl<'g> Renderer<'g> {
             pictures: HashMap::new(),
             instances: Instances::new(gpu),
             clusters,
+            pages,
             is_exact: true,
             edge_on: Vec::new(),
             eye: None,
@@ -215,7 +221,11 @@ impl<'g> Renderer<'g> {
     /// The device refused something.
     pub fn draw_full_detail(&mut self) -> Result<(), Error> {
         self.clusters = None;
-        Ok(self.shadows.set_bias(Bias::default())?)
+        self.shadows.set_bias(Bias::default())?;
+        if self.pages.is_some() {
+            self.pages = Some(PageDrawing::of_share(self.gpu, self.scene, &self.shadows, 0.0)?);
+        }
+        Ok(())
     }
 
     /// Whether clusters are chosen and drawn.
@@ -263,6 +273,9 @@ impl<'g> Renderer<'g> {
         casters: Casters<'_>,
         timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
+        if plan.paging.is_some() {
+            return self.draw_pages(eye, plan, casters, timer);
+        }
         if self.clusters.is_some() && self.edge_on.is_empty() {
             return self.draw_clusters(eye, plan, casters, timer);
         }
@@ -616,7 +629,10 @@ pub(crate) fn uniform_buffer<T>(device: &wgpu::Device, label: &str) -> Buffer {
 }
 
 /// How depths follow from distances, as `ViewUniform` has it.
-fn depth_projection(scene: &SceneBuffers, camera: &Camera) -> Result<DepthProjection, Error> {
+pub(crate) fn depth_projection(
+    scene: &SceneBuffers,
+    camera: &Camera,
+) -> Result<DepthProjection, Error> {
     Ok(if camera.is_orthographic() {
         DepthProjection::orthographic(camera.near(), scene.farthest(camera), true)?
     } else {
@@ -732,7 +748,7 @@ pub(crate) fn shader_text(lookup: &str) -> String {
     [lookup, include_str!("wgsl/forward.wgsl"), include_str!("wgsl/overlay.wgsl")].join("\n")
 }
 
-fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {
+pub(crate) fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {
     query.as_ref().and_then(GpuProfilerQuery::render_pass_timestamp_writes)
 }
 

@@ -3,7 +3,7 @@ use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 use umbrage::{Aabb, Camera};
 use umbrage_clusters::ClusterMesh;
 use umbrage_scene::{Alpha, Instance, Material, Mesh, Moved, Role, Sampling, Scene, Texture, Wrap};
@@ -31,6 +31,8 @@ pub struct SceneBuffers {
     pub(crate) material_layout: BindGroupLayout,
     /// The scene as clusters, if it was uploaded with them.
     pub(crate) clusters: Option<SceneClusters>,
+    /// The scene as clusters with all detail, from which pages are drawn if there are no others.
+    finest: OnceLock<RwLock<SceneClusters>>,
     /// Renderers share the buffers, so that a new pose reaches all of them.
     placed: RwLock<Placed>,
 }
@@ -196,8 +198,10 @@ impl SceneBuffers {
             range
         });
         let meshes: Vec<MeshRange> = meshes.collect();
-        let is_clustered = clusters.is_some() && gpu.support().clusters;
-        let vertex_usage = match is_clustered {
+        // Pages may be asked for later.
+        let can_cluster = gpu.support().clusters;
+        let is_clustered = clusters.is_some() && can_cluster;
+        let vertex_usage = match can_cluster {
             true => BufferUsages::VERTEX | BufferUsages::STORAGE,
             false => BufferUsages::VERTEX,
         };
@@ -211,12 +215,51 @@ impl SceneBuffers {
             material_layout,
             placed: RwLock::new(placed),
             clusters: None,
+            finest: OnceLock::new(),
         };
         if let Some(clusters) = clusters.filter(|_| is_clustered) {
             buffers.clusters = SceneClusters::new(gpu, scene, &buffers, clusters)?;
         }
         gpu.check()?;
         Ok(buffers)
+    }
+
+    /// Takes what pages are drawn from, unless the scene has it: the clusters of its meshes with all
+    /// detail. Without them, a [`Renderer`](crate::Renderer) refuses plans with pages.
+    ///
+    /// # Errors
+    /// The clusters are not those of the scene's meshes, or the device has no room for them.
+    pub fn make_pages(
+        &self,
+        gpu: &Gpu,
+        scene: &Scene,
+        finest: impl FnOnce() -> Vec<ClusterMesh>,
+    ) -> Result<(), Error> {
+        if self.clusters.is_some() || self.finest.get().is_some() {
+            return Ok(());
+        }
+        let clusters = SceneClusters::new(gpu, scene, self, &finest())?;
+        let clusters = clusters.ok_or_else(|| Error::TooLarge {
+            what: "the scene".into(),
+            problem: "clusters of its triangles, from which pages are drawn, need more memory"
+                .into(),
+        })?;
+        // Whoever came first has the same.
+        let _ = self.finest.set(RwLock::new(clusters));
+        gpu.check()
+    }
+
+    /// Does something with the clusters that pages are drawn from, and tells whether they have all
+    /// detail; `None` if there are none.
+    pub(crate) fn with_page_clusters<T>(
+        &self,
+        act: impl FnOnce(&SceneClusters, bool) -> T,
+    ) -> Option<T> {
+        if let Some(clusters) = &self.clusters {
+            return Some(act(clusters, false));
+        }
+        let finest = self.finest.get()?.read().unwrap_or_else(PoisonError::into_inner);
+        Some(act(&finest, true))
     }
 
     /// Moves instances and deforms meshes as `moved` tells of the scene that was uploaded, which
@@ -246,6 +289,13 @@ impl SceneBuffers {
         };
         let deformed: Option<Vec<_>> = moved.meshes.iter().map(of_mesh).collect();
         let Some(deformed) = deformed.filter(|_| is_same) else { return Err(Error::OtherScene) };
+        if self.finest.get().is_some() && !deformed.is_empty() {
+            return Err(Error::Invalid {
+                field: "meshes",
+                problem: "must keep their shape where pages are drawn, but some are deformed"
+                    .into(),
+            });
+        }
         let stride = self.attribute_layout.array_stride;
         let mut attributes = Vec::new();
         for (i, mesh, range) in deformed {
@@ -260,6 +310,10 @@ impl SceneBuffers {
             gpu.queue().write_buffer(&self.attributes, first * stride, contents);
         }
         let casters = placed.move_instances(scene, &moved.instances);
+        if let Some(finest) = self.finest.get().filter(|_| !moved.instances.is_empty()) {
+            let mut finest = finest.write().unwrap_or_else(PoisonError::into_inner);
+            finest.place(gpu, self, &placed)?;
+        }
         gpu.check()?;
         Ok(casters)
     }
@@ -291,7 +345,7 @@ impl SceneBuffers {
 
     /// Memory of vertices, indices and clusters, bytes.
     pub fn bytes(&self) -> u64 {
-        let clusters = self.clusters.as_ref().map_or(0, |c| c.geometry.bytes());
+        let clusters = self.with_page_clusters(|c, _| c.geometry.bytes()).unwrap_or(0);
         self.positions.size() + self.attributes.size() + self.indices.size() + clusters
     }
 }

@@ -1,4 +1,4 @@
-use crate::{Shadows, data, wgsl};
+use crate::{ClusterGeometry, Shadows, data, wgsl};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec4};
 use std::mem::size_of;
@@ -105,38 +105,69 @@ impl MeshCasters {
         buffers: &[Option<VertexBufferLayout<'_>>],
         own: Option<&BindGroupLayout>,
     ) -> Self {
-        let is_masked = kind == MeshKind::Masked;
-        let module = device.create_shader_module(ShaderModuleDescriptor {
-            label: Some("shadow casters"),
-            source: ShaderSource::Wgsl(text.into()),
-        });
-        let mask_layout = is_masked.then(|| mask_layout(device));
-        let layouts = [Some(shadows.caster_layout()), mask_layout.as_ref(), own];
-        let used = layouts.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-        let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
-            label: Some("shadow casters"),
-            bind_group_layouts: &layouts[..used],
-            immediate_size: 0,
-        });
         let fragment = match (kind, shadows.caster_needs_fragment()) {
             (MeshKind::Opaque, false) => None,
             (MeshKind::Opaque, true) => Some("shadow_caster_fragment"),
             (MeshKind::Masked, false) => Some("shadow_mesh_clamped_fragment"),
             (MeshKind::Masked, true) => Some("shadow_mesh_fragment"),
         };
+        let stages = Stages { text, vertex: "shadow_mesh_vertex", fragment };
+        Self::of_stages(device, shadows, kind, stages, buffers, shadows.caster_layout(), own)
+    }
+
+    /// Draws a geometry's clusters into pages, which the bind group of `page_layout` tells of.
+    pub(crate) fn of_pages(
+        device: &Device,
+        shadows: &Shadows,
+        kind: MeshKind,
+        text: String,
+        page_layout: &BindGroupLayout,
+        geometry: &ClusterGeometry,
+    ) -> Self {
+        // What lies beside a page is discarded.
+        let fragment = match shadows.caster_needs_fragment() {
+            false => "shadow_page_clamped_fragment",
+            true => "shadow_page_fragment",
+        };
+        let stages = Stages { text, vertex: "shadow_page_vertex", fragment: Some(fragment) };
+        let own = Some(geometry.vertex_layout());
+        Self::of_stages(device, shadows, kind, stages, &[], page_layout, own)
+    }
+
+    fn of_stages(
+        device: &Device,
+        shadows: &Shadows,
+        kind: MeshKind,
+        stages: Stages,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+        target_layout: &BindGroupLayout,
+        own: Option<&BindGroupLayout>,
+    ) -> Self {
+        let module = device.create_shader_module(ShaderModuleDescriptor {
+            label: Some("shadow casters"),
+            source: ShaderSource::Wgsl(stages.text.into()),
+        });
+        let mask_layout = (kind == MeshKind::Masked).then(|| mask_layout(device));
+        let layouts = [Some(target_layout), mask_layout.as_ref(), own];
+        let used = layouts.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+        let layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+            label: Some("shadow casters"),
+            bind_group_layouts: &layouts[..used],
+            immediate_size: 0,
+        });
         let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
             label: Some("shadow casters"),
             layout: Some(&layout),
             vertex: VertexState {
                 module: &module,
-                entry_point: Some("shadow_mesh_vertex"),
+                entry_point: Some(stages.vertex),
                 compilation_options: PipelineCompilationOptions::default(),
                 buffers,
             },
             primitive: shadows.primitive_state(),
             depth_stencil: Some(shadows.depth_stencil_state()),
             multisample: wgpu::MultisampleState::default(),
-            fragment: fragment.map(|entry_point| FragmentState {
+            fragment: stages.fragment.map(|entry_point| FragmentState {
                 module: &module,
                 entry_point: Some(entry_point),
                 compilation_options: PipelineCompilationOptions::default(),
@@ -180,6 +211,13 @@ impl MeshCasters {
             ],
         }))
     }
+}
+
+/// The stages that draw casters, by the names of their entry points in a text.
+struct Stages {
+    text: String,
+    vertex: &'static str,
+    fragment: Option<&'static str>,
 }
 
 fn mask_layout(device: &Device) -> BindGroupLayout {

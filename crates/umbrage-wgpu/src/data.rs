@@ -14,7 +14,7 @@ use umbrage::{Fade, Place, Plan, ShadowMap, Slab};
 pub(crate) struct Settings {
     pub(crate) texture_scale: [f32; 2],
     pub(crate) light_count: u32,
-    pub(crate) padding: u32,
+    pub(crate) pages_across: u32,
     pub(crate) pixel_gradient: Vec4,
     pub(crate) eye: Vec4,
     pub(crate) fade: Vec4,
@@ -93,6 +93,8 @@ pub(crate) struct Placed<'a> {
     pub(crate) texture_size: [u32; 2],
     pub(crate) render_origin: DVec3,
     pub(crate) bias: Bias,
+    /// Places of pages across the texture; 0 without pages.
+    pub(crate) pages_across: u32,
 }
 
 impl Lookup {
@@ -118,7 +120,7 @@ impl Lookup {
         }
         *settings = Settings {
             light_count: lights.len() as u32,
-            padding: 0,
+            pages_across: placed.pages_across,
             texture_scale: placed.texture_size.map(|n| 1.0 / n.max(1) as f32),
             pixel_gradient: {
                 let local_from_render = placed.render_origin - plan.origin;
@@ -418,6 +420,7 @@ mod tests {
             texture_size: [4096, 1024],
             render_origin: DVec3::ZERO,
             bias: Bias::default(),
+            pages_across: 0,
         };
         let mut lookup = Lookup::default();
         lookup.fill(&plan, &placed);

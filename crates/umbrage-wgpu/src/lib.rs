@@ -70,6 +70,7 @@ pub mod cookbook;
 mod culling;
 mod data;
 mod error;
+mod pages;
 mod passes;
 mod prefilter;
 mod readback;
@@ -86,6 +87,7 @@ pub use clusters::{
     ClusterOccluders, ClusterSelection, ClusterSource, ClusterVertices, ClusterView,
 };
 pub use error::Error;
+pub use pages::{PageCasters, PageCounts, PageFrame, PageTimestamps, PreparedPages};
 pub use passes::{MapPass, Prepared, Timestamps};
 pub use redraw::Redraw;
 pub use seen::{DepthProjection, SeenReadback};

@@ -121,7 +121,7 @@ impl Prepared<'_> {
             let load = if is_whole { LoadOp::Clear(1.0) } else { LoadOp::Load };
             let [is_first, is_last] = [Some(layer) == first, Some(layer) == last];
             let writes = part(timestamps.depth.as_ref(), is_first, is_last);
-            let mut pass = begin(encoder, &texture.layers[layer], load, writes);
+            let mut pass = depth_pass(encoder, &texture.layers[layer], load, writes);
             for (index, record, place) in stale_in(layer) {
                 let aim = Aim::new(&place, &filter, 0, [0; 2]);
                 aim.set_viewport(&mut pass);
@@ -162,7 +162,7 @@ impl Prepared<'_> {
     }
 }
 
-fn begin<'e>(
+pub(crate) fn depth_pass<'e>(
     encoder: &'e mut CommandEncoder,
     view: &TextureView,
     load: LoadOp<f32>,

@@ -103,7 +103,7 @@ impl DepthProjection {
         })
     }
 
-    fn check(self, camera: &Camera) -> Result<(), Error> {
+    pub(crate) fn check(self, camera: &Camera) -> Result<(), Error> {
         self.check_finite()?;
         let Self { is_orthographic, .. } = self;
         let invalid = |problem| Err(Error::Invalid { field: "depth", problem });

@@ -2,14 +2,15 @@ mod resources;
 
 use crate::culling::FourPlanes;
 use crate::data::{Lookup, Placed, clip_from_render};
+use crate::pages::Pages;
 use crate::passes::{Clear, Prepared};
 use crate::prefilter::Prefiltering;
 use crate::redraw::{Stale, Texels};
 use crate::slots::Slots;
 use crate::{Error, Support, wgsl};
 use glam::{DMat4, DVec3};
-pub(crate) use resources::DepthTexture;
 use resources::{Buffers, CasterBuffer, view_dimension};
+pub(crate) use resources::{DepthTexture, LookupParts};
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Faces, Place, Plan, Plane, Rows, ShadowMap, Slab, Technique};
 use wgpu::{
@@ -40,6 +41,10 @@ pub struct ShadowOptions {
     /// refuse such plans, and have no instruction for it; with it they serve plans without a fade
     /// too.
     pub fades: bool,
+    /// Whether plans have [pages](umbrage::paged). They then lie in one layer
+    /// ([`Layout::Atlas`]), and lookups read [`LookupBuffers::Storage`], whatever else was asked
+    /// for. [`Shadows::prepare_pages`] takes such plans, and [`Shadows::prepare`] all others.
+    pub pages: bool,
 }
 
 /// The kind of the buffers from which lookups read lights, maps and planes.
@@ -148,18 +153,20 @@ pub enum Casters<'a> {
 /// the shader text with which shaders look the maps up.
 #[derive(Debug)]
 pub struct Shadows {
-    options: ShadowOptions,
-    support: Support,
-    bias: Bias,
+    pub(crate) options: ShadowOptions,
+    pub(crate) support: Support,
+    pub(crate) bias: Bias,
     slots: Slots,
-    lookup: Lookup,
-    uploaded: Lookup,
-    buffers: Buffers,
+    pub(crate) lookup: Lookup,
+    pub(crate) uploaded: Lookup,
+    pub(crate) buffers: Buffers,
     pub(crate) casters: CasterBuffer,
     pub(crate) texture: DepthTexture,
-    sampler: wgpu::Sampler,
-    lookup_layout: BindGroupLayout,
-    lookup_bind_group: BindGroup,
+    pub(crate) sampler: wgpu::Sampler,
+    pub(crate) lookup_layout: BindGroupLayout,
+    pub(crate) lookup_bind_group: BindGroup,
+    /// `Some` if plans have pages.
+    pub(crate) pages: Option<Pages>,
     pub(crate) clear: Clear,
     /// `Some` if the filter is a prefilter.
     pub(crate) prefiltering: Option<Prefiltering>,
@@ -249,9 +256,25 @@ impl Shadows {
             _ if !support.depth_fetch => Comparison::Hardware,
             comparison => comparison,
         };
-        let buffers =
-            if support.storage_buffers { options.buffers } else { LookupBuffers::Uniform };
-        let options = ShadowOptions { comparison, buffers, ..*options };
+        if options.pages && !support.pages {
+            return Err(Error::Unsupported {
+                what: "eleven storage buffers in compute shaders",
+                why: "by which pages are found and drawn: take slices, as uniform(stable)+z4",
+            });
+        }
+        if options.pages && options.filter.prefilter().is_some() {
+            return Err(Error::Invalid {
+                field: "options.filter",
+                problem: "must be no prefilter with pages: take hard, pcfN or pcss".into(),
+            });
+        }
+        let buffers = match options.buffers {
+            _ if options.pages => LookupBuffers::Storage,
+            _ if !support.storage_buffers => LookupBuffers::Uniform,
+            buffers => buffers,
+        };
+        let layout = if options.pages { Layout::Atlas } else { options.layout };
+        let options = ShadowOptions { comparison, buffers, layout, ..*options };
         let filter_mode = match options.filter {
             Filter::Prefiltered(_) => FilterMode::Linear,
             Filter::Pcf { .. } if comparison == Comparison::Hardware => FilterMode::Linear,
@@ -276,8 +299,14 @@ impl Shadows {
             Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
             None => None,
         };
-        let view = looked_up(&texture, prefiltering.as_ref());
-        let lookup_bind_group = buffers.bind(device, &lookup_layout, view, &sampler);
+        let pages =
+            options.pages.then(|| Pages::new(device, &support, &options.filter, &lookup_layout));
+        let unbound = pages.as_ref().map(|_| Buffers::stand_ins(device));
+        let parts = LookupParts {
+            view: looked_up(&texture, prefiltering.as_ref()),
+            pages: unbound.as_ref().map(|buffers| buffers.each_ref()),
+        };
+        let lookup_bind_group = buffers.bind(device, &lookup_layout, &parts, &sampler);
         Ok(Self {
             options,
             support,
@@ -291,6 +320,7 @@ impl Shadows {
             sampler,
             lookup_layout,
             lookup_bind_group,
+            pages,
             clear: Clear::new(device),
             prefiltering,
             records: Vec::new(),
@@ -507,7 +537,9 @@ impl Shadows {
         if !self.options.filter.has_maps() {
             return 0;
         }
-        self.prefiltering.as_ref().map_or_else(|| self.texture_bytes(), Prefiltering::bytes)
+        let of_pages = self.pages.as_ref().map_or(0, Pages::bytes);
+        of_pages
+            + self.prefiltering.as_ref().map_or_else(|| self.texture_bytes(), Prefiltering::bytes)
     }
 
     /// Memory of the depth texture, bytes.
@@ -539,35 +571,13 @@ impl Shadows {
         frame: &Frame<'a>,
     ) -> Result<Prepared<'a>, Error> {
         let Frame { plan, render_origin, casters } = *frame;
-        if plan.filter != self.options.filter {
-            return Err(Error::OtherFilter {
-                planned: plan.filter,
-                looked_up: self.options.filter,
-            });
-        }
-        if plan.fade.is_some() && !self.options.fades {
+        self.check(plan, render_origin, casters)?;
+        if plan.paging.is_some() || self.options.pages {
             return Err(Error::Invalid {
-                field: "options.fades",
-                problem: "must be true for a plan whose shadows fade out, is false".into(),
+                field: "frame.plan",
+                problem: "has pages, or the options ask for them: take `Shadows::prepare_pages`"
+                    .into(),
             });
-        }
-        if !render_origin.is_finite() {
-            return Err(Error::Invalid {
-                field: "frame.render_origin",
-                problem: format!("must be finite, is {render_origin}"),
-            });
-        }
-        if let Casters::MovedIn(boxes) = casters {
-            let is_sound = |b: &&Aabb| b.is_empty() || is_position(b.min) && is_position(b.max);
-            if let Some(bad) = boxes.iter().find(|b| !is_sound(b)) {
-                return Err(Error::Invalid {
-                    field: "frame.casters",
-                    problem: format!("must lie within 1e12 metres of the origin, is {bad:?}"),
-                });
-            }
-        }
-        if let Some(map) = plan.maps.iter().position(|m| m.rows != Rows::Even && !m.is_empty()) {
-            return Err(Error::LogarithmicRows { map });
         }
         let filter = self.options.filter;
         self.slots.place(plan, self.options.layout, &filter, &self.support)?;
@@ -579,6 +589,7 @@ impl Shadows {
                 texture_size: self.texture.size_for(size, layers),
                 render_origin,
                 bias: self.bias,
+                pages_across: 0,
             },
         );
         self.lookup.check(self.options.buffers)?;
@@ -594,8 +605,9 @@ impl Shadows {
         rebind |= self.buffers.hold(device, self.options.buffers, &self.lookup);
         if rebind {
             let view = looked_up(&self.texture, self.prefiltering.as_ref());
+            let parts = LookupParts { view, pages: None };
             self.lookup_bind_group =
-                self.buffers.bind(device, &self.lookup_layout, view, &self.sampler);
+                self.buffers.bind(device, &self.lookup_layout, &parts, &self.sampler);
         }
         if rebind || self.lookup != self.uploaded {
             self.buffers.upload(queue, &self.lookup);
@@ -627,6 +639,48 @@ impl Shadows {
             }
         }
         Ok(Prepared { shadows: self, plan, render_origin })
+    }
+}
+
+impl Shadows {
+    /// Checks what all frames have.
+    pub(crate) fn check(
+        &self,
+        plan: &Plan,
+        render_origin: DVec3,
+        casters: Casters<'_>,
+    ) -> Result<(), Error> {
+        if plan.filter != self.options.filter {
+            return Err(Error::OtherFilter {
+                planned: plan.filter,
+                looked_up: self.options.filter,
+            });
+        }
+        if plan.fade.is_some() && !self.options.fades {
+            return Err(Error::Invalid {
+                field: "options.fades",
+                problem: "must be true for a plan whose shadows fade out, is false".into(),
+            });
+        }
+        if !render_origin.is_finite() {
+            return Err(Error::Invalid {
+                field: "frame.render_origin",
+                problem: format!("must be finite, is {render_origin}"),
+            });
+        }
+        if let Casters::MovedIn(boxes) = casters {
+            let is_sound = |b: &&Aabb| b.is_empty() || is_position(b.min) && is_position(b.max);
+            if let Some(bad) = boxes.iter().find(|b| !is_sound(b)) {
+                return Err(Error::Invalid {
+                    field: "frame.casters",
+                    problem: format!("must lie within 1e12 metres of the origin, is {bad:?}"),
+                });
+            }
+        }
+        if let Some(map) = plan.maps.iter().position(|m| m.rows != Rows::Even && !m.is_empty()) {
+            return Err(Error::LogarithmicRows { map });
+        }
+        Ok(())
     }
 }
 
@@ -671,6 +725,7 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
         LookupBuffers::Storage => BufferBindingType::Storage { read_only: true },
     };
     let buffer = |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let of_pages = options.pages.then(|| [array, array].map(buffer));
     let types = [
         buffer(BufferBindingType::Uniform),
         buffer(array),
@@ -694,7 +749,7 @@ fn lookup_layout(device: &Device, support: &Support, options: &ShadowOptions) ->
             None => SamplerBindingType::NonFiltering,
         }),
     ];
-    let entries = (0..).zip(types);
+    let entries = (0..).zip(types.into_iter().chain(of_pages.into_iter().flatten()));
     let entries: Vec<_> = entries
         .map(|(binding, ty)| BindGroupLayoutEntry { binding, visibility, ty, count: None })
         .collect();

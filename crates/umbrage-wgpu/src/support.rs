@@ -21,6 +21,9 @@ use wgpu::{
 /// - storage buffers in vertex shaders, indirect draws, or ten storage buffers in compute shaders,
 ///   there are no [clusters](crate::ClusterGeometry) but [`MeshCasters`](crate::MeshCasters) alone,
 ///   whose time grows with the number of triangles;
+/// - what clusters need, and an eleventh storage buffer in compute shaders, plans with
+///   [pages](umbrage::paged) are [`Error::Unsupported`]: take `uniform(stable)` slices, which stand
+///   still too;
 /// - compute shaders, or fetching depths, [`SeenReadback`](crate::SeenReadback) is
 ///   [`Error::Unsupported`];
 /// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
@@ -39,6 +42,8 @@ pub struct Support {
     pub compute: bool,
     /// Whether shaders can choose clusters of triangles, and draw what they chose.
     pub clusters: bool,
+    /// Whether shaders can place and draw the pages of plans that have some.
+    pub pages: bool,
     /// Whether textures of 32-bit floats can be interpolated, as `vsm`, `esm` and `evsm` need.
     pub float32: bool,
     /// Whether 16-bit normalised textures can be drawn into and interpolated, as `msm` and the
@@ -68,6 +73,9 @@ const STORAGE_BUFFERS: u32 = 3;
 
 /// The number of storage buffers that the choice of clusters uses at once.
 const CLUSTER_BUFFERS: u32 = 10;
+
+/// The number of storage buffers that the choice of clusters for pages uses at once.
+const PAGE_BUFFERS: u32 = 11;
 
 impl Support {
     /// Features that make shadows faster or allow more filters. Request those that the adapter has
@@ -143,6 +151,9 @@ impl Support {
             depth_fetch,
             compute,
             clusters,
+            pages: clusters
+                && storage_buffers
+                && limits.max_storage_buffers_per_shader_stage >= PAGE_BUFFERS,
             float32: features.contains(Features::FLOAT32_FILTERABLE),
             norm16: features.contains(Features::TEXTURE_FORMAT_16BIT_NORM),
             // Drawing into this format is not guaranteed on every device; only an adapter can tell.
@@ -169,6 +180,7 @@ impl Support {
         depth_fetch: true,
         compute: true,
         clusters: true,
+        pages: true,
         float32: true,
         norm16: true,
         snorm8: true,

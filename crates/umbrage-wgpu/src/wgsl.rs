@@ -116,7 +116,7 @@ pub(crate) fn named(text: &str, name: &str) -> String {
 }
 
 fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
-    let ShadowOptions { filter, comparison, layout, buffers, fades } = *options;
+    let ShadowOptions { filter, comparison, layout, buffers, fades, pages } = *options;
     let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
     let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
@@ -131,7 +131,14 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
     if !filter.has_maps() {
         return shader;
     }
-    shader.add([module!("choice"), if fades { module!("fade/far") } else { module!("fade/none") }]);
+    if pages {
+        add_pages(&mut shader, &filter);
+        shader.add([module!("served/pages"), module!("ends/page")]);
+    } else {
+        shader.add([module!("served/maps")]);
+    }
+    shader.add([module!("choice"), module!("with_filter")]);
+    shader.add([if fades { module!("fade/far") } else { module!("fade/none") }]);
     add_width(&mut shader, &filter);
     add_reach(&mut shader, &filter);
     let depths = match layout {
@@ -162,7 +169,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
         }
         (Filter::Spread { n, pattern, .. }, _) => {
             shader.add([depths, module!("filter/spread")]);
-            add_square(&mut shader, &filter, &places(pattern, n));
+            add_square(&mut shader, options, &places(pattern, n));
         }
         (Filter::Pcss { n, light }, _) => {
             let places = places(Pattern::Poisson, n);
@@ -176,7 +183,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
                 module!("blockers"),
                 generated::search(&directions, &places),
             ]);
-            add_square(&mut shader, &filter, &places);
+            add_square(&mut shader, options, &places);
         }
         (Filter::Prefiltered(prefilter), _) => {
             shader.add([
@@ -249,9 +256,100 @@ fn places(pattern: Pattern, n: u32) -> Vec<[f32; 2]> {
 }
 
 /// Adds the comparisons at these places of a square or a disc.
-fn add_square(shader: &mut Shader, filter: &Filter, places: &[[f32; 2]]) {
-    shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
+fn add_square(shader: &mut Shader, options: &ShadowOptions, places: &[[f32; 2]]) {
+    if !options.pages {
+        shader.constant("SHADOW_GUTTER", options.filter.reach_texels() as f32);
+        shader.add([module!("ends/map")]);
+    }
     shader.add([module!("square"), generated::comparisons(places)]);
+}
+
+/// Adds the module that finds pages, with the gutter around them that the filter reads.
+fn add_pages(shader: &mut Shader, filter: &Filter) {
+    shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
+    shader.add([module!("pages"), module!("page_types")]);
+}
+
+/// The bind group in which the request for pages has the lookup's bindings.
+pub(crate) const PAGE_LOOKUP_GROUP: u32 = 1;
+
+/// The text of the pass that lists the pages which the viewer's depths want.
+pub(crate) fn page_request(filter: &Filter, is_multisampled: bool) -> String {
+    page_request_shader(filter, is_multisampled).link()
+}
+
+fn page_request_shader(filter: &Filter, is_multisampled: bool) -> Shader {
+    let mut shader = Shader::new(module!("page_request"));
+    shader.constant("SHADOW_GROUP", PAGE_LOOKUP_GROUP);
+    add_pages(&mut shader, filter);
+    shader.add([
+        module!("maps"),
+        module!("buffers/storage"),
+        module!("choice"),
+        depths(is_multisampled),
+    ]);
+    shader
+}
+
+/// The text of the passes that give pages their places.
+pub(crate) fn page_allocate() -> String {
+    page_allocate_shader().link()
+}
+
+fn page_allocate_shader() -> Shader {
+    let mut shader = Shader::new(module!("page_allocate"));
+    shader.add([module!("page_types")]);
+    shader
+}
+
+/// The text of the pass that clears pages.
+pub(crate) fn page_clear(filter: &Filter, support: &Support) -> String {
+    page_clear_shader(filter, support).link()
+}
+
+fn page_clear_shader(filter: &Filter, support: &Support) -> Shader {
+    let mut shader = Shader::new(module!("page_clear"));
+    add_page_casters(&mut shader, filter, support);
+    shader
+}
+
+/// The text of the shader that draws clusters into pages, with the pages in bind group 0, the mask
+/// in bind group 1 and the clusters in bind group 2.
+pub(crate) fn page_caster(
+    support: &Support,
+    filter: &Filter,
+    layout: AttributeLayout,
+    is_masked: bool,
+) -> String {
+    page_caster_shader(support, filter, layout, is_masked).link()
+}
+
+fn page_caster_shader(
+    support: &Support,
+    filter: &Filter,
+    layout: AttributeLayout,
+    is_masked: bool,
+) -> Shader {
+    let root = if is_masked { module!("page_masked") } else { module!("page_opaque") };
+    let mut shader = Shader::new(root);
+    add_page_casters(&mut shader, filter, support);
+    if is_masked {
+        shader.add([module!("holes")]);
+        add_cluster_uv(&mut shader, layout);
+    }
+    add_cluster_vertex(&mut shader, CLUSTER_GROUP, layout);
+    shader
+}
+
+fn add_page_casters(shader: &mut Shader, filter: &Filter, support: &Support) {
+    shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
+    shader.constant("SHADOW_DEVICE_CLAMPS", support.depth_clip_control);
+    shader.add([module!("page_casters"), module!("maps"), module!("page_types")]);
+}
+
+/// The module that reads the viewer's depths.
+fn depths(is_multisampled: bool) -> Module {
+    if is_multisampled { module!("depths/multisampled") } else { module!("depths/single") }
 }
 
 /// Adds the lookup of a prefiltered map.
@@ -410,7 +508,9 @@ fn mesh_shader(support: &Support, is_masked: bool) -> Shader {
     let root = if is_masked { module!("mesh_masked") } else { module!("mesh_opaque") };
     let mut shader = Shader::new(root);
     shader.add([module!("caster"), module!("mesh")]);
-    shader.add(is_masked.then(|| module!("mask")));
+    if is_masked {
+        shader.add([module!("mask"), module!("holes")]);
+    }
     add_caster_constants(&mut shader, 0, support);
     shader
 }
@@ -433,7 +533,7 @@ fn cluster_caster_shader(support: &Support, layout: AttributeLayout, is_masked: 
     let mut shader = Shader::new(root);
     shader.add([module!("caster")]);
     if is_masked {
-        shader.add([module!("mask")]);
+        shader.add([module!("mask"), module!("holes")]);
         add_cluster_uv(&mut shader, layout);
     }
     add_cluster_vertex(&mut shader, CLUSTER_GROUP, layout);
@@ -477,14 +577,19 @@ fn add_cluster_uv(shader: &mut Shader, layout: AttributeLayout) {
     }]);
 }
 
-/// The text of the pass that chooses clusters.
-pub(crate) fn cluster_descent() -> String {
-    cluster_descent_shader().link()
+/// The text of the pass that chooses clusters, for maps whose pages are drawn or for other views.
+pub(crate) fn cluster_descent(for_pages: bool) -> String {
+    cluster_descent_shader(for_pages).link()
 }
 
-fn cluster_descent_shader() -> Shader {
+fn cluster_descent_shader(for_pages: bool) -> Shader {
     let mut shader = Shader::new(module!("cluster_descent"));
-    shader.add([module!("cluster_instance"), module!("cluster_types")]);
+    shader.add([module!("cluster_instance"), module!("cluster_types"), module!("cluster_views")]);
+    if for_pages {
+        shader.add([module!("cluster_pages/drawn"), module!("page_types")]);
+    } else {
+        shader.add([module!("cluster_pages/none")]);
+    }
     shader
 }
 
@@ -543,11 +648,7 @@ pub(crate) fn seen(is_multisampled: bool) -> String {
 
 fn seen_shader(is_multisampled: bool) -> Shader {
     let mut shader = Shader::new(module!("seen"));
-    shader.add([if is_multisampled {
-        module!("depths/multisampled")
-    } else {
-        module!("depths/single")
-    }]);
+    shader.add([depths(is_multisampled)]);
     shader
 }
 

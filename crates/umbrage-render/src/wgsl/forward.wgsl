@@ -393,6 +393,25 @@ fn sky_texels(@builtin(position) at: vec4f) -> @location(0) vec4f {
     return vec4f(0.0, 0.0, -1.0, 0.0);
 }
 
+// Depths alone.
+@fragment
+fn opaque_depth(in: Fragment) -> @location(0) vec4f {
+    return vec4f(0.0);
+}
+
+@fragment
+fn masked_depth(in: Fragment) -> @location(0) vec4f {
+    if (is_hole(in, base_color(in).a)) {
+        discard;
+    }
+    return vec4f(0.0);
+}
+
+@fragment
+fn sky_depth(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return vec4f(0.0);
+}
+
 // The number of the cluster that is seen, and its level of detail (-1: the sky).
 @fragment
 fn opaque_clusters(in: Fragment) -> @location(0) vec4f {

@@ -38,21 +38,7 @@ impl ClusterCasters {
         geometry: &ClusterGeometry,
         share: f32,
     ) -> Result<Self, Error> {
-        if !(share >= 0.0 && share.is_finite()) {
-            return Err(Error::Invalid {
-                field: "share",
-                problem: format!("must be finite and at least 0, is {share}"),
-            });
-        }
-        if shadows.bias().texels < share {
-            return Err(Error::Invalid {
-                field: "bias",
-                problem: format!(
-                    "must have at least {share} texels, which `ClusterCasters::bias` gives, has {}",
-                    shadows.bias().texels
-                ),
-            });
-        }
+        check_share(shadows, share)?;
         let casters = |kind| {
             let is_masked = kind == MeshKind::Masked;
             let text = wgsl::cluster_caster(shadows.support(), geometry.layout, is_masked);
@@ -118,22 +104,10 @@ impl ClusterCasters {
     ) -> u32 {
         let key = (map.redraw.index, map.redraw.rectangle);
         let Some(view) = self.chosen.iter().position(|&c| c == key) else { return 0 };
-        let Some(group) = self.selection.vertex_group() else { return 0 };
-        map.pass.set_bind_group(2, group, &[]);
-        let mut was_masked = None;
-        for batch in 0..self.caster_batches {
-            let mask = mask_of(batch);
-            if was_masked != Some(mask.is_some()) {
-                let casters = if mask.is_some() { &self.masked } else { &self.opaque };
-                map.pass.set_pipeline(casters.pipeline());
-                was_masked = Some(mask.is_some());
-            }
-            if let Some(mask) = mask {
-                map.pass.set_bind_group(1, mask, &[]);
-            }
-            self.selection.draw(map.pass, view as u32 * self.caster_batches + batch);
-        }
-        self.caster_batches
+        let first = view as u32 * self.caster_batches;
+        let batches = first..first + self.caster_batches;
+        let mask_of = |draw: u32| mask_of(draw - first);
+        self.selection.draw_batches(map.pass, [&self.opaque, &self.masked], batches, mask_of)
     }
 
     /// The bind group of a mask.
@@ -148,4 +122,24 @@ impl ClusterCasters {
         let counts = self.selection.counts(device);
         self.selection.is_counted().then_some(counts)
     }
+}
+
+/// Checks that casters may be off by this share of a texel.
+pub(crate) fn check_share(shadows: &Shadows, share: f32) -> Result<(), Error> {
+    if !(share >= 0.0 && share.is_finite()) {
+        return Err(Error::Invalid {
+            field: "share",
+            problem: format!("must be finite and at least 0, is {share}"),
+        });
+    }
+    if shadows.bias().texels < share {
+        return Err(Error::Invalid {
+            field: "bias",
+            problem: format!(
+                "must have at least {share} texels, which `ClusterCasters::bias` gives, has {}",
+                shadows.bias().texels
+            ),
+        });
+    }
+    Ok(())
 }

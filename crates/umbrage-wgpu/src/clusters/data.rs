@@ -80,7 +80,12 @@ pub(crate) struct View {
     pub(crate) first_draw: u32,
     pub(crate) roles: u32,
     pub(crate) is_picture: u32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) page_map: u32,
+    pub(crate) page_side: u32,
+    pub(crate) page_table: u32,
+    pub(crate) page_first: [i32; 2],
+    pub(crate) page_reach: f32,
+    pub(crate) padding: u32,
 }
 
 /// `ShadowClusterDescent`.
@@ -111,6 +116,7 @@ pub(crate) struct Choice {
     pub(crate) draw: u32,
     pub(crate) first: u32,
     pub(crate) block: u32,
+    pub(crate) page: u32,
 }
 
 /// `ShadowClusterDrawing`.

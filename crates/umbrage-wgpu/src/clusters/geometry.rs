@@ -96,6 +96,8 @@ pub struct AttributeLayout {
 #[derive(Debug)]
 pub(crate) struct Pipelines {
     pub(crate) descend: ComputePipeline,
+    /// `None` if the device has no pages.
+    pub(crate) descend_pages: Option<ComputePipeline>,
     pub(crate) draws: ComputePipeline,
     pub(crate) indices: ComputePipeline,
     pub(crate) occluders: ComputePipeline,
@@ -106,6 +108,7 @@ pub(crate) struct Pipelines {
     pub(crate) indices_layout: BindGroupLayout,
     pub(crate) vertex_layout: BindGroupLayout,
     pub(crate) hidden_layout: BindGroupLayout,
+    pub(crate) shown_layout: BindGroupLayout,
     pub(crate) occluders_layout: BindGroupLayout,
     pub(crate) farther_layout: BindGroupLayout,
 }
@@ -182,7 +185,7 @@ impl ClusterGeometry {
         let seen_batches = batches(|i| i.seen_batch);
         let caster_batches = batches(|i| i.caster_batch);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
-        let pipelines = Pipelines::new(device);
+        let pipelines = Pipelines::new(device, support);
         Ok(Self {
             nodes: buffer(device, &lists.nodes, usage),
             clusters: buffer(device, &lists.clusters, BufferUsages::STORAGE),
@@ -373,7 +376,7 @@ fn nothing_hides(device: &Device, pipelines: &Pipelines) -> BindGroup {
 }
 
 impl Pipelines {
-    fn new(device: &Device) -> Self {
+    fn new(device: &Device, support: &Support) -> Self {
         use BufferBindingType::Uniform;
         const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
         const WRITTEN: BufferBindingType = BufferBindingType::Storage { read_only: false };
@@ -450,11 +453,15 @@ impl Pipelines {
                 cache: None,
             })
         };
+        let shown_layout = layout(compute, &[READ], false);
+        let of_descent = [Some(&descent_layout), Some(&round_layout), Some(&hidden_layout)];
+        let [first, second, third] = of_descent;
+        let of_pages = [first, second, third, Some(&shown_layout)];
+        let for_pages = || pipeline(wgsl::cluster_descent(true), &of_pages);
         Self {
-            descend: pipeline(
-                wgsl::cluster_descent(),
-                &[Some(&descent_layout), Some(&round_layout), Some(&hidden_layout)],
-            ),
+            descend: pipeline(wgsl::cluster_descent(false), &of_descent),
+            descend_pages: support.pages.then(for_pages),
+            shown_layout: shown_layout.clone(),
             draws: pipeline(wgsl::cluster_draws(), &[Some(&draws_layout)]),
             indices: pipeline(wgsl::cluster_indices(), &[Some(&indices_layout)]),
             occluders: pipeline(wgsl::cluster_occluders(), &[Some(&occluders_layout)]),

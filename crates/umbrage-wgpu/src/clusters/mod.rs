@@ -10,9 +10,12 @@ mod tree;
 mod view;
 
 pub use casters::ClusterCasters;
+pub(crate) use casters::check_share;
+pub(crate) use geometry::buffer;
 pub use geometry::{
     AttributeLayout, ClusterGeometry, ClusterInstance, ClusterSource, ClusterVertices,
 };
 pub use occluders::ClusterOccluders;
 pub use selection::{ClusterCounts, ClusterSelection};
 pub use view::ClusterView;
+pub(crate) use view::PagesOfView;

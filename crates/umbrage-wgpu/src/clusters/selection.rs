@@ -3,9 +3,10 @@ use super::geometry::{ClusterGeometry, buffer};
 use super::occluders::ClusterOccluders;
 use super::view::ClusterView;
 use crate::readback::Readback;
-use crate::{Error, Support};
+use crate::{Error, MeshCasters, Support};
 use glam::DVec3;
 use std::mem::size_of;
+use std::ops::Range;
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
     BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
@@ -106,6 +107,15 @@ struct Sizes {
     spans: usize,
 }
 
+/// What a choice depends on beside its views.
+struct Others<'a> {
+    /// The bind group of what hides clusters.
+    hides: Option<&'a BindGroup>,
+    has_occluders: bool,
+    /// The bind group of the pages that are fresh.
+    shown: Option<&'a BindGroup>,
+}
+
 /// A choice whose counts are on their way.
 #[derive(Clone, Copy, Debug)]
 struct Pending {
@@ -179,6 +189,37 @@ impl ClusterSelection {
         occluders: Option<&ClusterOccluders>,
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) -> Result<(), Error> {
+        let hides = occluders.and_then(ClusterOccluders::group);
+        let others = Others { hides, has_occluders: occluders.is_some(), shown: None };
+        let to = (device, queue, encoder);
+        self.encode_with(to, geometry, views, render_origin, together, &others, timestamps)
+    }
+
+    /// Encodes the choice of clusters for the fresh pages of maps, of which `shown` tells.
+    pub(crate) fn encode_pages(
+        &mut self,
+        to: (&Device, &Queue, &mut CommandEncoder),
+        geometry: &ClusterGeometry,
+        views: &[ClusterView],
+        render_origin: DVec3,
+        shown: &BindGroup,
+        timestamps: Option<ComputePassTimestampWrites<'_>>,
+    ) -> Result<(), Error> {
+        let others = Others { hides: None, has_occluders: false, shown: Some(shown) };
+        self.encode_with(to, geometry, views, render_origin, 0, &others, timestamps)
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "device, queue and encoder are one in spirit")]
+    fn encode_with(
+        &mut self,
+        (device, queue, encoder): (&Device, &Queue, &mut CommandEncoder),
+        geometry: &ClusterGeometry,
+        views: &[ClusterView],
+        render_origin: DVec3,
+        together: u32,
+        others: &Others<'_>,
+        timestamps: Option<ComputePassTimestampWrites<'_>>,
+    ) -> Result<(), Error> {
         if !render_origin.is_finite() {
             return Err(Error::Invalid {
                 field: "render_origin",
@@ -191,7 +232,9 @@ impl ClusterSelection {
         let mut spans = Vec::new();
         let mut draws = 0;
         for view in views {
-            let mut own = view.data(planes.len() as u32, draws);
+            // All pages are drawn together.
+            let first_draw = if view.pages.is_some() { 0 } else { draws };
+            let mut own = view.data(planes.len() as u32, first_draw);
             if self.relief > 1.0 {
                 own.share = own.share.max(LEAST_RELIEVED) * self.relief;
             }
@@ -199,8 +242,8 @@ impl ClusterSelection {
             planes.extend_from_slice(&view.planes);
             let batches =
                 if view.is_picture { geometry.seen_batches } else { geometry.caster_batches };
-            spans.push(Span { first: draws, count: together.min(batches) });
-            draws += batches;
+            spans.push(Span { first: first_draw, count: together.min(batches) });
+            draws = first_draw + batches;
         }
         self.draws = draws;
         let wanted = Sizes {
@@ -258,10 +301,15 @@ impl ClusterSelection {
                 timestamp_writes: timestamps,
             });
             let pipelines = &geometry.pipelines;
-            pass.set_pipeline(&pipelines.descend);
+            match (others.shown, &pipelines.descend_pages) {
+                (Some(shown), Some(descend)) => {
+                    pass.set_pipeline(descend);
+                    pass.set_bind_group(3, shown, &[]);
+                }
+                _ => pass.set_pipeline(&pipelines.descend),
+            }
             pass.set_bind_group(0, &buffers.descent_group, &[]);
-            let hides = occluders.and_then(ClusterOccluders::group);
-            pass.set_bind_group(2, hides.unwrap_or(&geometry.nothing_hides), &[]);
+            pass.set_bind_group(2, others.hides.unwrap_or(&geometry.nothing_hides), &[]);
             for round in 0..geometry.rounds.min(MAX_ROUNDS as u32) {
                 let is_odd = round as usize & 1;
                 pass.set_bind_group(1, &buffers.round_groups[is_odd], &[round * self.alignment]);
@@ -278,7 +326,7 @@ impl ClusterSelection {
         self.encoded += 1;
         self.placements = geometry.placements;
         if let Some(slot) = self.slots.iter_mut().find(|slot| slot.is_free()) {
-            let (number, has_occluders) = (self.encoded, occluders.is_some());
+            let (number, has_occluders) = (self.encoded, others.has_occluders);
             slot.send(encoder, &buffers.counts, Pending { number, room, relief, has_occluders });
         }
         Ok(())
@@ -312,6 +360,33 @@ impl ClusterSelection {
         let Some(buffers) = &self.buffers else { return };
         pass.set_index_buffer(buffers.indices.slice(..), IndexFormat::Uint32);
         pass.draw_indexed_indirect(&buffers.draws, u64::from(draw) * 20);
+    }
+
+    /// Draws these draws, each of which casts with the pipeline without or with a mask, in bind
+    /// group 1. Returns their number.
+    pub(crate) fn draw_batches<'a>(
+        &self,
+        pass: &mut RenderPass<'_>,
+        [opaque, masked]: [&MeshCasters; 2],
+        draws: Range<u32>,
+        mask_of: impl Fn(u32) -> Option<&'a BindGroup>,
+    ) -> u32 {
+        let Some(group) = self.vertex_group() else { return 0 };
+        pass.set_bind_group(2, group, &[]);
+        let mut was_masked = None;
+        for draw in draws.clone() {
+            let mask = mask_of(draw);
+            if was_masked != Some(mask.is_some()) {
+                let casters = if mask.is_some() { masked } else { opaque };
+                pass.set_pipeline(casters.pipeline());
+                was_masked = Some(mask.is_some());
+            }
+            if let Some(mask) = mask {
+                pass.set_bind_group(1, mask, &[]);
+            }
+            self.draw(pass, draw);
+        }
+        draws.len() as u32
     }
 
     /// Draws the batches of a view that are drawn [together](Self::encode).

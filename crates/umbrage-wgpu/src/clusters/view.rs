@@ -1,7 +1,7 @@
 use super::data;
 use crate::{DepthProjection, Error, Redraw};
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Vec4};
-use umbrage::Plane;
+use umbrage::{Plane, ShadowMap};
 
 /// A view for which clusters are chosen: a shadow map, or a picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,23 @@ pub struct ClusterView {
     pub(crate) nearest: f64,
     pub(crate) share: f32,
     pub(crate) is_picture: bool,
+    /// Of a map whose pages are drawn.
+    pub(crate) pages: Option<PagesOfView>,
+}
+
+/// What a view is told of the pages of its map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PagesOfView {
+    /// The map's index.
+    pub(crate) map: u32,
+    /// Pages across the map's window.
+    pub(crate) side: u32,
+    /// The place of the window's first entry among those that tell what is fresh.
+    pub(crate) table: u32,
+    /// The lower 32 bits of the indices of the window's first page.
+    pub(crate) first: [i32; 2],
+    /// How far beyond a page its casters count, texels.
+    pub(crate) reach: f32,
 }
 
 impl ClusterView {
@@ -54,12 +71,33 @@ impl ClusterView {
             nearest: nearest.max(0.0),
             share,
             is_picture: true,
+            pages: None,
         })
     }
 
     /// A map, or the part of it that is drawn.
     pub(crate) fn map(redraw: &Redraw<'_>, render_origin: DVec3, share: f32) -> Self {
         let map = redraw.shadow_map;
+        Self { share, ..Self::of_map(map, redraw.local_planes(), render_origin) }
+    }
+
+    /// A map whose pages are drawn.
+    pub(crate) fn of_pages(
+        map: &ShadowMap,
+        pages: PagesOfView,
+        render_origin: DVec3,
+        share: f32,
+    ) -> Self {
+        let planes = map.caster_planes.iter().map(|p| p.normal.extend(p.offset).as_vec4());
+        Self { share, pages: Some(pages), ..Self::of_map(map, planes, render_origin) }
+    }
+
+    /// A map, of which something is drawn within these half-spaces (local space).
+    fn of_map(
+        map: &ShadowMap,
+        local_planes: impl Iterator<Item = Vec4>,
+        render_origin: DVec3,
+    ) -> Self {
         let local_from_render = render_origin - map.origin;
         let m = map.shadow_from_local * DMat4::from_translation(local_from_render);
         let size = DVec2::from(map.resolution.map(f64::from));
@@ -75,7 +113,7 @@ impl ClusterView {
         } else {
             0.0
         };
-        let planes = redraw.local_planes().map(|plane| {
+        let planes = local_planes.map(|plane| {
             let offset = f64::from(plane.w) + plane.truncate().as_dvec3().dot(local_from_render);
             plane.truncate().extend(offset as f32)
         });
@@ -85,8 +123,9 @@ impl ClusterView {
             size,
             planes: planes.collect(),
             nearest,
-            share,
+            share: 0.0,
             is_picture: false,
+            pages: None,
         }
     }
 
@@ -130,7 +169,12 @@ impl ClusterView {
             first_draw,
             roles,
             is_picture: self.is_picture.into(),
-            padding: [0; 3],
+            page_map: self.pages.map_or(0, |pages| pages.map + 1),
+            page_side: self.pages.map_or(0, |pages| pages.side),
+            page_table: self.pages.map_or(0, |pages| pages.table),
+            page_first: self.pages.map_or([0; 2], |pages| pages.first),
+            page_reach: self.pages.map_or(0.0, |pages| pages.reach),
+            padding: 0,
         }
     }
 }

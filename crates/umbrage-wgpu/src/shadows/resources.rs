@@ -18,7 +18,7 @@ use wgpu::{
 #[derive(Debug)]
 pub(crate) struct DepthTexture {
     pub(super) texture: Texture,
-    pub(super) all: TextureView,
+    pub(crate) all: TextureView,
     /// One view for each layer.
     pub(crate) layers: Vec<TextureView>,
     /// Whether nothing has been drawn into the texture yet.
@@ -27,11 +27,18 @@ pub(crate) struct DepthTexture {
 
 /// The buffers that lookup reads.
 #[derive(Debug)]
-pub(super) struct Buffers {
+pub(crate) struct Buffers {
     settings: Buffer,
     lights: Buffer,
     maps: Buffer,
     planes: Buffer,
+}
+
+/// What lookups read beside the buffers that the CPU writes.
+pub(crate) struct LookupParts<'a> {
+    pub(crate) view: &'a TextureView,
+    /// Levels and table of pages.
+    pub(crate) pages: Option<[&'a Buffer; 2]>,
 }
 
 /// The matrices with which casters are drawn into the stale maps, one every `stride` bytes, and the
@@ -46,7 +53,7 @@ pub(crate) struct CasterBuffer {
 }
 
 impl DepthTexture {
-    pub(super) fn new(
+    pub(crate) fn new(
         device: &Device,
         support: &Support,
         layout: Layout,
@@ -124,7 +131,7 @@ impl Buffers {
     }
 
     /// Replaces the buffers that are too small for `lookup`; `true` if any was replaced.
-    pub(super) fn hold(&mut self, device: &Device, kind: LookupBuffers, lookup: &Lookup) -> bool {
+    pub(crate) fn hold(&mut self, device: &Device, kind: LookupBuffers, lookup: &Lookup) -> bool {
         let mut has_grown = false;
         let mut hold = |buffer: &mut Buffer, bytes: usize| {
             if buffer.size() < bytes as u64 {
@@ -138,18 +145,18 @@ impl Buffers {
         has_grown
     }
 
-    pub(super) fn upload(&self, queue: &Queue, lookup: &Lookup) {
+    pub(crate) fn upload(&self, queue: &Queue, lookup: &Lookup) {
         queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&lookup.settings));
         queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&lookup.lights));
         queue.write_buffer(&self.maps, 0, bytemuck::cast_slice(&lookup.maps));
         queue.write_buffer(&self.planes, 0, bytemuck::cast_slice(&lookup.planes));
     }
 
-    pub(super) fn bind(
+    pub(crate) fn bind(
         &self,
         device: &Device,
         layout: &BindGroupLayout,
-        texture: &TextureView,
+        parts: &LookupParts<'_>,
         sampler: &wgpu::Sampler,
     ) -> BindGroup {
         let resources = [
@@ -157,10 +164,11 @@ impl Buffers {
             self.lights.as_entire_binding(),
             self.maps.as_entire_binding(),
             self.planes.as_entire_binding(),
-            BindingResource::TextureView(texture),
+            BindingResource::TextureView(parts.view),
             BindingResource::Sampler(sampler),
         ];
-        let entries = (0..).zip(resources);
+        let of_pages = parts.pages.into_iter().flatten().map(|b| b.as_entire_binding());
+        let entries = (0..).zip(resources.into_iter().chain(of_pages));
         let entries: Vec<_> =
             entries.map(|(binding, resource)| BindGroupEntry { binding, resource }).collect();
         device.create_bind_group(&BindGroupDescriptor {
@@ -168,6 +176,18 @@ impl Buffers {
             layout,
             entries: &entries,
         })
+    }
+}
+
+impl Buffers {
+    /// Buffers in place of those of pages while there are none.
+    pub(crate) fn stand_ins(device: &Device) -> [Buffer; 2] {
+        [(); 2].map(|()| buffer(device, 64, BufferUsages::STORAGE))
+    }
+
+    /// The buffer of the maps.
+    pub(crate) fn maps(&self) -> &Buffer {
+        &self.maps
     }
 }
 

@@ -91,11 +91,19 @@ fn variants() -> impl Iterator<Item = ShadowOptions> {
                     buffers,
                     // The two ways differ in one function alone.
                     fades: filter == Filter::Hard || filter == Filter::None,
+                    pages: false,
                 })
             })
         })
     };
-    filters.flat_map(with)
+    let all: Vec<_> = filters.flat_map(with).collect();
+    let has_pages = |o: &&ShadowOptions| {
+        let is_storage = o.buffers == LookupBuffers::Storage && o.layout == Layout::Atlas;
+        is_storage && o.filter.prefilter().is_none()
+    };
+    let paged: Vec<_> = all.iter().filter(has_pages).collect();
+    let paged: Vec<_> = paged.into_iter().map(|&o| ShadowOptions { pages: true, ..o }).collect();
+    all.into_iter().chain(paged)
 }
 
 #[test]
@@ -113,7 +121,8 @@ fn every_lookup_module_is_valid_in_front_of_a_users_shader() {
 /// blur over a width depends on the surface.
 #[test]
 fn no_filter_has_a_loop() {
-    const WITH_LOOPS: [&str; 3] = ["lookup", "choice", "footprint/width"];
+    const WITH_LOOPS: [&str; 5] =
+        ["served/maps", "served/pages", "pages", "choice", "footprint/width"];
     let mut filters = Vec::new();
     for word in umbrage::language::FILTERS {
         filters.push(word.example.to_owned());
@@ -153,12 +162,23 @@ fn every_other_module_is_valid() {
         for layout in attribute_layouts() {
             for is_masked in [true, false] {
                 validated(&cluster_caster(&support, layout, is_masked));
+                for filter in page_filters() {
+                    validated(&page_caster(&support, &filter, layout, is_masked));
+                }
             }
             validated(&cluster_vertex(3, layout));
         }
     }
+    for filter in page_filters() {
+        for is_multisampled in [false, true] {
+            validated(&page_request(&filter, is_multisampled));
+        }
+        validated(&page_clear(&filter, &Support::FULL));
+    }
     for text in [
-        cluster_descent(),
+        page_allocate(),
+        cluster_descent(true),
+        cluster_descent(false),
         cluster_draws(),
         cluster_indices(),
         cluster_occluders(),
@@ -296,7 +316,7 @@ fn structs_of_clusters_are_laid_out_alike() {
     }
     let of = |name, (offsets, size): (&'static [usize], usize)| (name, offsets, size);
     spans(
-        &cluster_descent(),
+        &cluster_descent(true),
         &[
             ("ShadowClusterNode", &[0, 12, 16, 20, 24, 28], size_of::<ours::Node>()),
             ("ShadowCluster", &[0, 12, 16, 28, 32, 36, 40, 44, 48, 52], size_of::<ours::Cluster>()),
@@ -316,7 +336,12 @@ fn structs_of_clusters_are_laid_out_alike() {
                         plane_count,
                         first_draw,
                         roles,
-                        is_picture
+                        is_picture,
+                        page_map,
+                        page_side,
+                        page_table,
+                        page_first,
+                        page_reach
                     ]
                 ),
             ),
@@ -325,7 +350,7 @@ fn structs_of_clusters_are_laid_out_alike() {
             of("ShadowClusterItem", offsets!(ours::Item, [view, instance, node])),
             of(
                 "ShadowClusterChoice",
-                offsets!(ours::Choice, [instance, cluster, draw, first, block]),
+                offsets!(ours::Choice, [instance, cluster, draw, first, block, page]),
             ),
             of("ShadowClusterOrigin", offsets!(ours::Origin, [high, low])),
             (
@@ -353,6 +378,54 @@ fn structs_of_clusters_are_laid_out_alike() {
         &cluster_indices(),
         &[of("ShadowClusterIndexing", offsets!(ours::Indexing, [choices, triangles, blocks]))],
     );
+}
+
+#[test]
+fn structs_of_pages_are_laid_out_alike() {
+    use crate::pages::data as ours;
+    let (module, _) = validated(&page_allocate());
+    check_layout!(
+        &module,
+        "ShadowPageLevel",
+        ours::Level,
+        [first, side, table, level, levels, slabs, slab, is_second]
+    );
+    check_layout!(
+        &module,
+        "ShadowPlacedPage",
+        ours::PlacedPage,
+        [map, slab, index, slot, wanted, drawn, is_stale]
+    );
+    check_layout!(&module, "ShadowFreshPage", ours::FreshPage, [place, map, page, slot]);
+    check_layout!(
+        &module,
+        "ShadowPageFrame",
+        ours::Frame,
+        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups]
+    );
+    let (module, _) = validated(&page_request(&Filter::Hard, false));
+    check_layout!(
+        &module,
+        "ShadowPageView",
+        ours::View,
+        [
+            start,
+            base,
+            start_x,
+            per_nearness,
+            start_y,
+            is_orthographic,
+            way,
+            background,
+            way_x,
+            frame,
+            way_y,
+            room,
+            size
+        ]
+    );
+    let (module, _) = validated(&page_clear(&Filter::Hard, &Support::FULL));
+    check_layout!(&module, "ShadowPagePool", ours::Pool, [size, across]);
 }
 
 #[test]
@@ -392,6 +465,11 @@ fn lookups() -> Vec<Shader> {
     unlike(variants().map(|options| lookup_shader(2, &options)))
 }
 
+/// Filters of pages with gutters and without.
+fn page_filters() -> [Filter; 2] {
+    [Filter::Hard, Filter::Pcf { n: 3 }]
+}
+
 /// A layout of each kind.
 fn attribute_layouts() -> [AttributeLayout; 3] {
     let layout = |uv, alpha| AttributeLayout { stride: 5, uv, alpha };
@@ -418,9 +496,19 @@ fn shaders() -> Vec<Shader> {
     for layout in attribute_layouts() {
         let caster = |is_masked| cluster_caster_shader(&Support::FULL, layout, is_masked);
         shaders.extend([true, false].map(caster));
+        let in_pages = |is_masked| {
+            page_caster_shader(&Support::FULL, &Filter::Pcf { n: 3 }, layout, is_masked)
+        };
+        shaders.extend([true, false].map(in_pages));
         shaders.push(cluster_picture_shader(2, layout));
     }
-    shaders.extend([cluster_descent_shader(), cluster_draws_shader(), cluster_indices_shader()]);
+    for is_multisampled in [false, true] {
+        shaders.push(page_request_shader(&Filter::Hard, is_multisampled));
+    }
+    shaders.push(page_allocate_shader());
+    shaders.push(page_clear_shader(&Filter::Hard, &Support::FULL));
+    shaders.extend([true, false].map(cluster_descent_shader));
+    shaders.extend([cluster_draws_shader(), cluster_indices_shader()]);
     shaders.extend([cluster_occluders_shader(), cluster_farther_shader()]);
     unlike(shaders.into_iter())
 }

@@ -202,7 +202,8 @@ fn a_floor_seen_from_above_has_the_pages_that_it_takes() {
         // The floor is 20 m wide, from −10 to 10, and pages begin at 0.
         let across = 2.0 * (10.0 / (64.0 * texel)).ceil();
         let level = texel.log2() as i32;
-        let (pages, fallback): (Vec<Page>, Vec<Page>) = pages.iter().partition(|p| p.level == level);
+        let (pages, fallback): (Vec<Page>, Vec<Page>) =
+            pages.iter().partition(|p| p.level == level);
         assert_eq!(pages.len() as f64, across * across, "{error}");
         // One page of 32 m or more in each quarter.
         assert!(fallback.len() == 4 && fallback.iter().all(|page: &Page| page.level == level + 4));

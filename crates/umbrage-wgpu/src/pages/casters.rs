@@ -1,0 +1,100 @@
+use super::Pages;
+use crate::clusters::check_share;
+use crate::{
+    ClusterCounts, ClusterGeometry, ClusterSelection, ClusterView, Error, Mask, MeshCasters,
+    MeshKind, Shadows, wgsl,
+};
+use glam::DVec3;
+use wgpu::{BindGroup, CommandEncoder, ComputePassTimestampWrites, Device, Queue, RenderPass};
+
+/// Draws clusters into pages: in each page, for each of its places, as many triangles as its texels
+/// can tell from the whole mesh. As [`ClusterCasters`](crate::ClusterCasters) does for maps, and
+/// with the same [bias](crate::ClusterCasters::bias).
+#[derive(Debug)]
+pub struct PageCasters {
+    opaque: MeshCasters,
+    masked: MeshCasters,
+    selection: ClusterSelection,
+    share: f32,
+    caster_batches: u32,
+}
+
+impl PageCasters {
+    /// Makes the pipelines that draw a geometry's clusters into pages. `share` is the part of a
+    /// texel by which casters may be off, at least 0; with 0 all casters have all of their detail.
+    ///
+    /// # Errors
+    /// As for [`ClusterCasters::new`](crate::ClusterCasters::new), and [`Error::Invalid`] if the
+    /// shadows have no pages.
+    pub fn new(
+        device: &Device,
+        shadows: &Shadows,
+        geometry: &ClusterGeometry,
+        share: f32,
+    ) -> Result<Self, Error> {
+        check_share(shadows, share)?;
+        let Some(pages) = &shadows.pages else {
+            return Err(Error::Invalid {
+                field: "options.pages",
+                problem: "must be true for shadows whose pages are drawn, is false".into(),
+            });
+        };
+        let (support, filter) = (shadows.support(), &shadows.options().filter);
+        let casters = |kind| {
+            let is_masked = kind == MeshKind::Masked;
+            let text = wgsl::page_caster(support, filter, geometry.layout, is_masked);
+            MeshCasters::of_pages(device, shadows, kind, text, Pages::draw_layout(pages), geometry)
+        };
+        Ok(Self {
+            opaque: casters(MeshKind::Opaque),
+            masked: casters(MeshKind::Masked),
+            selection: ClusterSelection::new(device, support, geometry),
+            share,
+            caster_batches: geometry.caster_batches,
+        })
+    }
+
+    /// The part of a texel by which casters may be off.
+    pub fn share(&self) -> f32 {
+        self.share
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "device, queue and encoder are one in spirit")]
+    pub(super) fn choose(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        geometry: &ClusterGeometry,
+        views: &[ClusterView],
+        render_origin: DVec3,
+        shown: &BindGroup,
+        timestamps: Option<ComputePassTimestampWrites<'_>>,
+    ) -> Result<(), Error> {
+        let to = (device, queue, encoder);
+        self.selection.encode_pages(to, geometry, views, render_origin, shown, timestamps)
+    }
+
+    /// Draws what was chosen, into a pass whose pages are bound. Returns the number of draws.
+    pub(super) fn draw<'a>(
+        &self,
+        pass: &mut RenderPass<'_>,
+        mask_of: impl Fn(u32) -> Option<&'a BindGroup>,
+    ) -> u32 {
+        let batches = 0..self.caster_batches;
+        self.selection.draw_batches(pass, [&self.opaque, &self.masked], batches, mask_of)
+    }
+
+    /// The bind group of a mask.
+    pub fn mask(&self, device: &Device, queue: &Queue, mask: &Mask<'_>) -> Option<BindGroup> {
+        self.masked.mask(device, queue, mask)
+    }
+
+    /// What was chosen last, as far as the device has told; `None` while the last choice is under
+    /// way. Where it was [not complete](ClusterCounts::is_complete), casters are missing from pages:
+    /// draw them again with [`Casters::Moved`](crate::Casters::Moved).
+    pub fn counts(&mut self, device: &Device) -> Option<ClusterCounts> {
+        let counts = self.selection.counts(device);
+        self.selection.is_counted().then_some(counts)
+    }
+}

@@ -1,0 +1,185 @@
+//! The data of pages that shaders read. Each struct has the layout of the struct in `wgsl/` that
+//! its comment names.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use umbrage::paged::{PAGE_TEXELS, Paging};
+use umbrage::{Aabb, Camera, ShadowMap, ViewRay};
+
+/// `ShadowPageLevel`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Level {
+    pub(crate) first: [i32; 2],
+    pub(crate) side: u32,
+    pub(crate) table: u32,
+    pub(crate) level: i32,
+    pub(crate) levels: u32,
+    pub(crate) slabs: u32,
+    pub(crate) slab: i32,
+    pub(crate) is_second: u32,
+    pub(crate) padding: u32,
+}
+
+/// `ShadowPlacedPage`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct PlacedPage {
+    pub(crate) map: u32,
+    pub(crate) slab: i32,
+    pub(crate) index: [i32; 2],
+    pub(crate) slot: u32,
+    pub(crate) wanted: u32,
+    pub(crate) drawn: u32,
+    pub(crate) is_stale: u32,
+}
+
+/// `SHADOW_PAGE_EMPTY` of `wgsl/page_types.wesl`.
+pub(crate) const EMPTY: u32 = u32::MAX;
+
+/// `ShadowFreshPage`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FreshPage {
+    pub(crate) place: u32,
+    pub(crate) map: u32,
+    pub(crate) page: u32,
+    pub(crate) slot: u32,
+}
+
+/// `ShadowPageFrame`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Frame {
+    pub(crate) frame: u32,
+    pub(crate) places: u32,
+    pub(crate) room: u32,
+    pub(crate) boxes: u32,
+    pub(crate) error: f32,
+    pub(crate) least_bias: f32,
+    pub(crate) are_all_stale: u32,
+    pub(crate) maps: u32,
+    pub(crate) groups: [u32; 2],
+}
+
+/// `ShadowPageView`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct View {
+    pub(crate) start: Vec3,
+    pub(crate) base: f32,
+    pub(crate) start_x: Vec3,
+    pub(crate) per_nearness: f32,
+    pub(crate) start_y: Vec3,
+    pub(crate) is_orthographic: u32,
+    pub(crate) way: Vec3,
+    pub(crate) background: f32,
+    pub(crate) way_x: Vec3,
+    pub(crate) frame: u32,
+    pub(crate) way_y: Vec3,
+    pub(crate) room: u32,
+    pub(crate) size: [u32; 2],
+    pub(crate) padding: [u32; 2],
+}
+
+/// `ShadowPagePool`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Pool {
+    pub(crate) size: Vec2,
+    pub(crate) across: u32,
+    pub(crate) padding: u32,
+}
+
+/// Words of the state of all pages, and the places in it: see `wgsl/page_types.wesl`.
+pub(crate) const STATE_WORDS: usize = 8;
+pub(crate) const BIAS: usize = 3;
+pub(crate) const MISSING: usize = 4;
+pub(crate) const FRESH: usize = 5;
+pub(crate) const USED: usize = 7;
+
+/// Words of the table's head.
+pub(crate) const TABLE_HEAD: u32 = 8;
+
+/// The levels of a plan's maps, and the number of the table's words.
+pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
+    let mut table = TABLE_HEAD;
+    let mut levels = Vec::with_capacity(paging.levels.len());
+    for grid in &paging.grids {
+        for (offset, map) in grid.maps.clone().enumerate() {
+            let own = &paging.levels[map];
+            let slabs = grid.slabs as i64;
+            let slab_of_level = offset as i64 % slabs;
+            let words = own.side * own.side;
+            // The windows of neighbouring slabs take turns, so that a slab keeps its place in the
+            // table when it becomes the first one.
+            let turn = own.slab.rem_euclid(slabs) as u32;
+            levels.push(Level {
+                first: own.first_page.map(|i| i as i32),
+                side: own.side,
+                table: table + turn * words,
+                level: own.level,
+                levels: (grid.last_level() - own.level + 1) as u32,
+                slabs: slabs as u32,
+                slab: own.slab as i32,
+                is_second: slab_of_level as u32,
+                padding: 0,
+            });
+            if slab_of_level == slabs - 1 {
+                table += slabs as u32 * words;
+            }
+        }
+    }
+    (levels, table)
+}
+
+/// The pages of a map that the shadow of a box (world space) may touch: first column and row, and
+/// the last ones, which are less than the first if it touches none. `reach` texels beyond a page
+/// belong to it.
+pub(crate) fn touched(map: &ShadowMap, level: &Level, aabb: Aabb, reach: u32) -> [i32; 4] {
+    const NOTHING: [i32; 4] = [i32::MAX, i32::MAX, i32::MIN, i32::MIN];
+    const ALL: [i32; 4] = [i32::MIN, i32::MIN, i32::MAX, i32::MAX];
+    if aabb.is_empty() || !map.may_cast(aabb) {
+        return NOTHING;
+    }
+    let [mut low, mut high] = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+    for corner in aabb.corners() {
+        let Some(at) = map.project(corner) else { return ALL };
+        let texel = at.truncate() * f64::from(map.resolution[0]);
+        low = low.min(texel);
+        high = high.max(texel);
+    }
+    let side = f64::from(level.side);
+    let page = |texel: DVec2| {
+        (texel / f64::from(PAGE_TEXELS)).floor().clamp(DVec2::splat(-1.0), DVec2::splat(side))
+    };
+    let margin = f64::from(reach) + 1.0;
+    let [low, high] = [page(low - margin), page(high + margin)];
+    let index = |page: f64, axis: usize| level.first[axis].wrapping_add(page as i32);
+    [index(low.x, 0), index(low.y, 1), index(high.x, 0), index(high.y, 1)]
+}
+
+impl View {
+    /// The points that a camera sees at pixels and distances, relative to `render_origin`.
+    pub(crate) fn new(camera: &Camera, render_origin: DVec3) -> Self {
+        let rays = [DVec2::ZERO, DVec2::X, DVec2::Y].map(|pixel| camera.ray(pixel));
+        // A whole picture apart, so that no digits are lost between pixels.
+        let [width, height] = camera.image().map(f64::from);
+        let [right, below] = [DVec2::new(width, 0.0), DVec2::new(0.0, height)];
+        let step = |end: DVec2, length: f64, part: fn(&ViewRay) -> DVec3| {
+            (part(&camera.ray(end)) - part(&rays[0])) / length
+        };
+        let [start, way] = [|ray: &ViewRay| ray.start, |ray: &ViewRay| ray.direction];
+        Self {
+            start: (rays[0].start + camera.eye() - render_origin).as_vec3(),
+            start_x: step(right, width, start).as_vec3(),
+            start_y: step(below, height, start).as_vec3(),
+            way: rays[0].direction.as_vec3(),
+            way_x: step(right, width, way).as_vec3(),
+            way_y: step(below, height, way).as_vec3(),
+            is_orthographic: camera.is_orthographic().into(),
+            size: camera.image(),
+            ..Self::default()
+        }
+    }
+}

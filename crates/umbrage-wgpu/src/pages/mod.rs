@@ -1,0 +1,171 @@
+//! Plans with pages on the device: which pages are wanted, where they lie, and how they are drawn.
+
+mod casters;
+pub(crate) mod data;
+mod pool;
+
+use crate::clusters::PagesOfView;
+use crate::seen::check_depths;
+use crate::shadows::{Casters, Shadows};
+use crate::{ClusterGeometry, ClusterView, DepthProjection, Error};
+pub use casters::PageCasters;
+use glam::DVec3;
+pub(crate) use pool::Pages;
+use umbrage::Plan;
+use wgpu::{
+    BindGroup, CommandEncoder, ComputePassTimestampWrites, Device, Queue,
+    RenderPassTimestampWrites, TextureView,
+};
+
+/// The input of [`Shadows::prepare_pages`]: the pages to draw and look up in one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct PageFrame<'a> {
+    /// The plan, which must have [pages](umbrage::paged) and the filter of the
+    /// [`ShadowOptions`](crate::ShadowOptions).
+    pub plan: &'a Plan,
+    /// World position of render space's origin, metres. All three coordinates must be finite.
+    pub render_origin: DVec3,
+    /// How the casters differ from those of the last prepared frame. Pages in which casters moved
+    /// are drawn again.
+    pub casters: Casters<'a>,
+    /// The depths of all receivers that the plan's camera sees: a view of the depth aspect alone,
+    /// whose texture has the usage `TEXTURE_BINDING`. The picture lies at the upper left. Pixels
+    /// without a surface have the depth of the far plane: 0 if depth is reversed, otherwise 1.
+    pub depth: &'a TextureView,
+    /// How those depths follow from distances.
+    pub projection: DepthProjection,
+}
+
+/// The timestamps that the passes of pages write when they begin and end.
+#[derive(Clone, Debug, Default)]
+pub struct PageTimestamps<'a> {
+    /// Finding the pages that are wanted, and their places.
+    pub request: Option<ComputePassTimestampWrites<'a>>,
+    /// Choosing what is drawn into them.
+    pub choice: Option<ComputePassTimestampWrites<'a>>,
+    /// Drawing them.
+    pub depth: Option<RenderPassTimestampWrites<'a>>,
+}
+
+/// What became of the pages of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PageCounts {
+    /// Pages that were wanted, and those that stand in for them.
+    pub wanted: u32,
+    /// Pages of these that had no room, so that coarser ones were looked up.
+    pub missing: u32,
+    /// Pages that were drawn, because they were new or because casters had moved.
+    pub drawn: u32,
+    /// The pages that there is room for.
+    pub room: u32,
+    /// The [bias](umbrage::paged::Paging::bias) of levels that the frame had.
+    pub bias: f32,
+    /// The greatest width of a texel that a receiver had, pixels, but for missing pages.
+    pub bound: f32,
+}
+
+/// A frame whose pages can now be found and drawn with [`encode`](Self::encode).
+#[derive(Debug)]
+#[must_use = "pages are drawn only if their passes are encoded"]
+pub struct PreparedPages<'a> {
+    pub(crate) shadows: &'a mut Shadows,
+    pub(crate) plan: &'a Plan,
+    pub(crate) render_origin: DVec3,
+}
+
+impl PreparedPages<'_> {
+    /// Encodes the passes that find the pages which the frame wants, give them places, choose the
+    /// clusters that cast into those that are new or out of date, and draw these. Nothing comes
+    /// back from the device for it. `mask_of` gives the [mask](PageCasters::mask) of each batch of
+    /// casters, `None` for those without holes.
+    ///
+    /// Encode this behind the pass that draws the viewer's depths and ahead of those that look
+    /// shadows up, and submit it before you prepare the next frame. Returns the number of draws.
+    ///
+    /// # Errors
+    /// As for [`ClusterSelection::encode`](crate::ClusterSelection::encode).
+    pub fn encode<'m>(
+        self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        casters: &mut PageCasters,
+        geometry: &ClusterGeometry,
+        mask_of: impl Fn(u32) -> Option<&'m BindGroup>,
+        timestamps: PageTimestamps<'_>,
+    ) -> Result<u32, Error> {
+        let Self { shadows, plan, render_origin } = self;
+        let (Some(paging), Some(pages)) = (&plan.paging, &mut shadows.pages) else { return Ok(0) };
+        if plan.maps.is_empty() {
+            return Ok(0);
+        }
+        let PageTimestamps { request, choice, depth } = timestamps;
+        pages.encode_request(encoder, &shadows.lookup_bind_group, request);
+        let reach = shadows.options.filter.reach_texels();
+        let maps = plan.maps.len() as u32;
+        let views =
+            (0..).zip(plan.maps.iter().zip(pages.levels())).map(|(map, (planned, level))| {
+                let (side, first) = (level.side, level.first);
+                let table = 4 * maps + level.table;
+                let own = PagesOfView { map, side, table, first, reach: reach as f32 + 1.0 };
+                ClusterView::of_pages(planned, own, render_origin, casters.share())
+            });
+        let views: Vec<_> = views.collect();
+        debug_assert_eq!(views.len(), paging.levels.len());
+        let Some(shown) = pages.shown_group(device, geometry) else { return Ok(0) };
+        casters.choose(device, queue, encoder, geometry, &views, render_origin, shown, choice)?;
+        let texture = &mut shadows.texture;
+        let mut pass = pages.begin_draw(encoder, texture, depth);
+        let draws = casters.draw(&mut pass, mask_of);
+        drop(pass);
+        texture.is_fresh = false;
+        Ok(draws)
+    }
+}
+
+impl Shadows {
+    /// Uploads what shaders need for a frame with pages. If the result is dropped without being
+    /// encoded, no page is found or drawn, and lookups find those of the frame before.
+    ///
+    /// # Errors
+    /// As for [`prepare`](Self::prepare), and [`Error::Invalid`] if the plan has no pages, if the
+    /// [options](crate::ShadowOptions::pages) have none, or if the depths cannot be read.
+    pub fn prepare_pages<'a>(
+        &'a mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &PageFrame<'a>,
+    ) -> Result<PreparedPages<'a>, Error> {
+        let PageFrame { plan, render_origin, casters, depth, projection } = *frame;
+        self.check(plan, render_origin, casters)?;
+        let Some(paging) = &plan.paging else {
+            return Err(Error::Invalid {
+                field: "frame.plan",
+                problem: "has no pages: hand it to `Shadows::prepare`".into(),
+            });
+        };
+        if !self.options.pages {
+            return Err(Error::Invalid {
+                field: "options.pages",
+                problem: "must be true for a plan with pages, is false".into(),
+            });
+        }
+        projection.check(&paging.camera)?;
+        check_depths(depth, paging.camera.image())?;
+        if !plan.maps.is_empty() {
+            self.upload_pages(device, queue, frame, paging);
+        }
+        Ok(PreparedPages { shadows: self, plan, render_origin })
+    }
+
+    /// What became of the pages of the newest frame that the device has told of; `None` before the
+    /// first. This does not wait for the device.
+    pub fn page_counts(&mut self, device: &Device) -> Option<PageCounts> {
+        self.pages.as_mut()?.counts(device)
+    }
+
+    /// Whether [`page_counts`](Self::page_counts) are those of the last frame that was encoded.
+    pub fn are_pages_counted(&self) -> bool {
+        self.pages.as_ref().is_none_or(Pages::is_counted)
+    }
+}

@@ -1,0 +1,627 @@
+//! The pool of pages: its buffers, and the passes that find out which pages there are.
+
+use super::data::{self, Level, STATE_WORDS};
+use super::{PageCounts, PageFrame};
+use crate::clusters::buffer;
+use crate::passes::depth_pass;
+use crate::readback::Readback;
+use crate::shadows::{Casters, DepthTexture, LookupParts, Shadows, depth_state};
+use crate::{ClusterGeometry, Layout, Support, wgsl};
+use glam::Vec2;
+use std::mem::size_of;
+use umbrage::paged::{Grid, PAGE_TEXELS, Paging};
+use umbrage::visibility::Filter;
+use umbrage::{Aabb, Place};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferDescriptor, BufferUsages, CommandEncoder, CompareFunction, ComputePassDescriptor,
+    ComputePassTimestampWrites, ComputePipeline, ComputePipelineDescriptor, Device, LoadOp,
+    MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PollType,
+    PrimitiveState, Queue, RenderPass, RenderPassTimestampWrites, RenderPipeline,
+    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    TextureSampleType, TextureView, TextureViewDimension, VertexState,
+};
+
+/// The most times that pages are listed in a frame, `SHADOW_PAGE_ATTEMPTS` of
+/// `wgsl/page_allocate.wesl`.
+const ATTEMPTS: u32 = 6;
+
+/// Stamps of a frame: one for each attempt, and some to spare.
+const STAMPS: u32 = 8;
+
+/// Texels for each pixel that a view is expected to need with an error of one pixel.
+const EXPECTED_TEXELS: f64 = 7.0;
+
+/// The fewest places of a pool without a budget.
+const LEAST_PLACES: u32 = 256;
+
+/// Pages on a device.
+#[derive(Debug)]
+pub(crate) struct Pages {
+    pipelines: Pipelines,
+    uniforms: Uniforms,
+    /// What everything below was made for; `None` at first.
+    key: Option<Key>,
+    held: Option<Held>,
+    levels: Vec<Level>,
+    /// The places that plans without a budget have, once they have needed more than expected.
+    grown: Option<u32>,
+    frame: u32,
+    /// The workgroups that look at the viewer's depths.
+    groups: [u32; 2],
+    is_multisampled: bool,
+    /// What the viewer's depths were bound with last.
+    seen: Option<(TextureView, BindGroup)>,
+    readbacks: [Readback<Pending>; 3],
+    encoded: u32,
+    counted: u32,
+    counts: Option<PageCounts>,
+}
+
+/// What pages depend on that are kept from frame to frame.
+#[derive(Clone, Debug, PartialEq)]
+struct Key {
+    grids: Vec<Grid>,
+    sides: Vec<u32>,
+    places: u32,
+}
+
+/// Counts that are on their way.
+#[derive(Clone, Copy, Debug)]
+struct Pending {
+    number: u32,
+    room: u32,
+    least_bias: f32,
+    error: f32,
+    has_budget: bool,
+}
+
+#[derive(Debug)]
+struct Pipelines {
+    /// For depths with one sample, and for several.
+    requests: [ComputePipeline; 2],
+    request_layouts: [BindGroupLayout; 2],
+    begin: ComputePipeline,
+    allocate: ComputePipeline,
+    allocate_layout: BindGroupLayout,
+    clear: RenderPipeline,
+    draw_layout: BindGroupLayout,
+}
+
+#[derive(Debug)]
+struct Uniforms {
+    frame: Buffer,
+    view: Buffer,
+    pool: Buffer,
+}
+
+/// The buffers of a pool.
+#[derive(Debug)]
+struct Held {
+    levels: Buffer,
+    table: Buffer,
+    stamps: Buffer,
+    wanted: Buffer,
+    state: Buffer,
+    calls: Buffer,
+    boxes: Buffer,
+    shown: Buffer,
+    room: u32,
+    allocate_group: BindGroup,
+    draw_group: BindGroup,
+    shown_group: Option<BindGroup>,
+    pending: Pending,
+    /// Everything else that the bind groups hold.
+    _others: [Buffer; 3],
+}
+
+impl Pages {
+    /// Makes the pipelines. `lookup_layout` is that of the lookup with pages.
+    pub(crate) fn new(
+        device: &Device,
+        support: &Support,
+        filter: &Filter,
+        lookup_layout: &BindGroupLayout,
+    ) -> Self {
+        let uniform = |size: usize| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("shadow pages"),
+                size: size as u64,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let bytes = 4 * STATE_WORDS as u64;
+        Self {
+            pipelines: Pipelines::new(device, support, filter, lookup_layout),
+            uniforms: Uniforms {
+                frame: uniform(size_of::<data::Frame>()),
+                view: uniform(size_of::<data::View>()),
+                pool: uniform(size_of::<data::Pool>()),
+            },
+            key: None,
+            held: None,
+            levels: Vec::new(),
+            grown: None,
+            frame: 0,
+            groups: [1; 2],
+            is_multisampled: false,
+            seen: None,
+            readbacks: [(); 3].map(|()| Readback::new(device, "shadow pages", bytes)),
+            encoded: 0,
+            counted: 0,
+            counts: None,
+        }
+    }
+
+    /// The buffers that lookups read; `None` before the first frame.
+    pub(crate) fn lookup_buffers(&self) -> Option<[&Buffer; 2]> {
+        self.held.as_ref().map(|held| [&held.levels, &held.table])
+    }
+
+    /// The levels of the plan's maps.
+    pub(crate) fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Memory of what lookups read beside the texture, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.held.as_ref().map_or(0, |held| held.levels.size() + held.table.size())
+    }
+
+    /// The places that a plan's pages get, and how many of them lie across the texture.
+    fn places(&self, paging: &Paging, support: &Support, place_side: u32) -> [u32; 2] {
+        let [width, height] = paging.camera.image().map(f64::from);
+        let expected = EXPECTED_TEXELS * width * height
+            / (f64::from(PAGE_TEXELS).powi(2) * paging.error * paging.error);
+        let wanted = paging
+            .budget
+            .unwrap_or_else(|| self.grown.unwrap_or((expected.ceil() as u32).max(LEAST_PLACES)));
+        let most = support.max_side / place_side;
+        let places = wanted.min(most.saturating_mul(most));
+        let across = f64::from(places).sqrt().ceil() as u32;
+        // A texture without a budget has no reason to leave the end of its last row empty.
+        let places = if paging.budget.is_some() { places } else { across * across };
+        [places, across]
+    }
+
+    /// The bind group by which clusters are chosen for fresh pages.
+    pub(crate) fn shown_group(
+        &mut self,
+        device: &Device,
+        geometry: &ClusterGeometry,
+    ) -> Option<&BindGroup> {
+        let Held { shown, shown_group, .. } = self.held.as_mut()?;
+        let layout = &geometry.pipelines.shown_layout;
+        Some(shown_group.get_or_insert_with(|| group(device, layout, &[shown])))
+    }
+
+    /// Encodes the passes that find the pages of a frame and give them places.
+    pub(crate) fn encode_request(
+        &mut self,
+        encoder: &mut CommandEncoder,
+        lookup_group: &BindGroup,
+        timestamps: Option<ComputePassTimestampWrites<'_>>,
+    ) {
+        let (Some(held), Some((_, seen_group))) = (&self.held, &self.seen) else { return };
+        let pipelines = &self.pipelines;
+        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor {
+            label: Some("shadow pages"),
+            timestamp_writes: timestamps,
+        });
+        pass.set_bind_group(0, &held.allocate_group, &[]);
+        pass.set_pipeline(&pipelines.begin);
+        pass.dispatch_workgroups(1, 1, 1);
+        for attempt in 0..ATTEMPTS {
+            pass.set_pipeline(&pipelines.requests[usize::from(self.is_multisampled)]);
+            pass.set_bind_group(0, seen_group, &[]);
+            pass.set_bind_group(wgsl::PAGE_LOOKUP_GROUP, lookup_group, &[]);
+            if attempt == 0 {
+                pass.dispatch_workgroups(self.groups[0], self.groups[1], 1);
+            } else {
+                // No workgroup, if the pages have their places.
+                pass.dispatch_workgroups_indirect(&held.calls, 0);
+            }
+            pass.set_pipeline(&pipelines.allocate);
+            pass.set_bind_group(0, &held.allocate_group, &[]);
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        drop(pass);
+        self.encoded += 1;
+        if let Some(readback) = self.readbacks.iter_mut().find(|r| r.is_free()) {
+            let pending = Pending { number: self.encoded, ..held.pending };
+            readback.send(encoder, &held.state, pending);
+        }
+    }
+
+    /// Begins the pass that draws pages, which clears those that will be drawn.
+    pub(crate) fn begin_draw<'e>(
+        &self,
+        encoder: &'e mut CommandEncoder,
+        texture: &DepthTexture,
+        timestamps: Option<RenderPassTimestampWrites<'_>>,
+    ) -> RenderPass<'e> {
+        let load = if texture.is_fresh { LoadOp::Clear(1.0) } else { LoadOp::Load };
+        let mut pass = depth_pass(encoder, &texture.layers[0], load, timestamps);
+        if let Some(held) = &self.held {
+            pass.set_bind_group(0, &held.draw_group, &[]);
+            if !texture.is_fresh {
+                pass.set_pipeline(&self.pipelines.clear);
+                pass.draw_indirect(&held.calls, 16);
+            }
+        }
+        pass
+    }
+
+    /// The layout of the bind group with which casters are drawn into pages.
+    pub(crate) fn draw_layout(&self) -> &BindGroupLayout {
+        &self.pipelines.draw_layout
+    }
+
+    /// The newest counts that have come back.
+    pub(crate) fn counts(&mut self, device: &Device) -> Option<PageCounts> {
+        // A lost device has no news; what was counted before stays.
+        let _ = device.poll(PollType::Poll);
+        self.collect();
+        self.counts
+    }
+
+    pub(crate) fn is_counted(&self) -> bool {
+        self.counted == self.encoded
+    }
+
+    fn collect(&mut self) {
+        let Self { readbacks, counted, counts, grown, .. } = self;
+        for readback in readbacks {
+            readback.receive(|pending, bytes| {
+                if pending.number <= *counted {
+                    return;
+                }
+                let words: &[u32] = bytemuck::cast_slice(bytes);
+                *counted = pending.number;
+                let bias = f32::from_bits(words[data::BIAS]);
+                let now = PageCounts {
+                    wanted: words[data::USED],
+                    missing: words[data::MISSING],
+                    drawn: words[data::FRESH],
+                    room: pending.room,
+                    bias,
+                    bound: pending.error * bias.exp2(),
+                };
+                *counts = Some(now);
+                // Without a budget there is room for what is wanted. Pages grow by four a level.
+                if !pending.has_budget && (bias > pending.least_bias || now.missing > 0) {
+                    let factor = (2.0 * (bias - pending.least_bias)).exp2().clamp(1.0, 4.0);
+                    let wanted = 1.25 * factor * now.wanted.max(pending.room) as f32;
+                    *grown = Some((wanted.ceil() as u32).max(grown.unwrap_or(0)));
+                }
+            });
+        }
+    }
+}
+
+impl Shadows {
+    /// Uploads a plan's pages, for which the pool is made anew if its grids have changed.
+    pub(super) fn upload_pages(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &PageFrame<'_>,
+        paging: &Paging,
+    ) {
+        let PageFrame { plan, render_origin, casters, depth, projection } = *frame;
+        let filter = self.options.filter;
+        let place_side = PAGE_TEXELS + 2 * filter.reach_texels();
+        let Self { pages, lookup, texture, buffers, support, .. } = self;
+        let Some(pages) = pages else { return };
+        pages.collect();
+        let [places, across] = pages.places(paging, support, place_side);
+        let size = [across, places.div_ceil(across)].map(|n| n * place_side);
+        let whole = |map: &umbrage::ShadowMap| {
+            Some(Place { layer: 0, origin: [0; 2], size: map.resolution })
+        };
+        lookup.fill(
+            plan,
+            &crate::data::Placed {
+                places: &plan.maps.iter().map(whole).collect::<Vec<_>>(),
+                texture_size: size,
+                render_origin,
+                bias: self.bias,
+                pages_across: across,
+            },
+        );
+        let mut rebind = buffers.hold(device, self.options.buffers, lookup);
+        let (levels, table_words) = data::levels(paging);
+        let boxes = match casters {
+            Casters::MovedIn(boxes) => boxes,
+            Casters::Moved | Casters::Unmoved => &[],
+        };
+        let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
+        pages.levels = levels;
+        let has_room = pages
+            .held
+            .as_ref()
+            .is_some_and(|held| held.boxes.size() >= size_of_val(&*touched) as u64);
+        let is_same = pages.key.as_ref().is_some_and(|key| {
+            key.places == places
+                && key.grids == paging.grids
+                && key.sides.iter().eq(paging.levels.iter().map(|level| &level.side))
+        });
+        if !(is_same && has_room && !rebind) {
+            let sides = paging.levels.iter().map(|level| level.side).collect();
+            pages.key = Some(Key { grids: paging.grids.clone(), sides, places });
+            let room = Sizes { places, table: table_words, boxes: touched.len() };
+            pages.make(device, queue, room, buffers.maps());
+            rebind = true;
+        }
+        if texture.size() != size || !is_same {
+            if texture.size() != size {
+                *texture = DepthTexture::new(device, support, Layout::Atlas, size, 1);
+                rebind = true;
+            }
+            texture.is_fresh = true;
+        }
+        if rebind {
+            let parts = LookupParts { view: &texture.all, pages: pages.lookup_buffers() };
+            self.lookup_bind_group =
+                buffers.bind(device, &self.lookup_layout, &parts, &self.sampler);
+        }
+        buffers.upload(queue, lookup);
+        std::mem::swap(&mut self.lookup, &mut self.uploaded);
+
+        pages.frame = pages.frame.wrapping_add(1);
+        let is_multisampled = depth.texture().sample_count() > 1;
+        pages.is_multisampled = is_multisampled;
+        pages.groups = paging.camera.image().map(|n| n.div_ceil(8));
+        let Pages { held: Some(held), uniforms, pipelines, seen, .. } = pages else { return };
+        held.pending = Pending {
+            number: 0,
+            room: places,
+            least_bias: paging.bias as f32,
+            error: paging.error as f32,
+            has_budget: paging.budget.is_some(),
+        };
+        let shared = data::Frame {
+            frame: pages.frame,
+            places,
+            room: held.room,
+            boxes: boxes.len() as u32,
+            error: paging.error as f32,
+            least_bias: paging.bias as f32,
+            are_all_stale: (casters == Casters::Moved).into(),
+            maps: plan.maps.len() as u32,
+            groups: pages.groups,
+        };
+        let view = data::View {
+            base: projection.base as f32,
+            per_nearness: projection.per_nearness as f32,
+            background: if projection.per_nearness > 0.0 { 0.0 } else { 1.0 },
+            frame: STAMPS.wrapping_mul(pages.frame),
+            room: held.room,
+            ..data::View::new(&paging.camera, render_origin)
+        };
+        let pool = data::Pool { size: Vec2::from(size.map(|n| n as f32)), across, padding: 0 };
+        queue.write_buffer(&uniforms.frame, 0, bytemuck::bytes_of(&shared));
+        queue.write_buffer(&uniforms.view, 0, bytemuck::bytes_of(&view));
+        queue.write_buffer(&uniforms.pool, 0, bytemuck::bytes_of(&pool));
+        queue.write_buffer(&held.levels, 0, bytemuck::cast_slice(&pages.levels));
+        queue.write_buffer(&held.boxes, 0, bytemuck::cast_slice(&touched));
+        if seen.as_ref().is_none_or(|(bound, _)| bound != depth) {
+            let layout = &pipelines.request_layouts[usize::from(is_multisampled)];
+            let buffers = [&uniforms.view, &held.stamps, &held.wanted, &held.state];
+            let entry = |binding, resource| BindGroupEntry { binding, resource };
+            let others = (1..).zip(buffers).map(|(i, b)| entry(i, b.as_entire_binding()));
+            let entries = [entry(0, BindingResource::TextureView(depth))].into_iter().chain(others);
+            let bound = device.create_bind_group(&BindGroupDescriptor {
+                label: Some("shadow pages"),
+                layout,
+                entries: &entries.collect::<Vec<_>>(),
+            });
+            *seen = Some((depth.clone(), bound));
+        }
+    }
+}
+
+/// The numbers of elements that a pool's buffers have room for.
+struct Sizes {
+    places: u32,
+    table: u32,
+    boxes: usize,
+}
+
+impl Pages {
+    /// For each map and box the pages that the box's shadow may touch.
+    fn touched(
+        &self,
+        plan: &umbrage::Plan,
+        levels: &[Level],
+        boxes: &[Aabb],
+        reach: u32,
+    ) -> Vec<[i32; 4]> {
+        let maps = plan.maps.iter().zip(levels);
+        maps.flat_map(|(map, level)| boxes.iter().map(|&b| data::touched(map, level, b, reach)))
+            .collect()
+    }
+
+    /// Makes an empty pool.
+    fn make(&mut self, device: &Device, queue: &Queue, sizes: Sizes, maps: &Buffer) {
+        let Sizes { places, table, boxes } = sizes;
+        let room = 2 * places + 1024;
+        let stored = |elements: usize, size: usize, usage: BufferUsages| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("shadow pages"),
+                size: (elements * size).max(16) as u64,
+                usage: usage | BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let none = BufferUsages::empty();
+        let count = |n: u32| n as usize;
+        let levels = stored(self.levels.len(), size_of::<Level>(), none);
+        let table_buffer = stored(count(table), 4, none);
+        let stamps = stored(count(table), 4, none);
+        let wanted = stored(count(room), 16, none);
+        let state = stored(STATE_WORDS, 4, BufferUsages::COPY_SRC);
+        let fresh = stored(count(places), size_of::<data::FreshPage>(), none);
+        let lists = stored(count(places + room), 4, none);
+        let calls = stored(8, 4, BufferUsages::INDIRECT);
+        let boxes = stored(boxes.next_power_of_two(), 16, none);
+        let shown = stored(4 * self.levels.len() + count(table), 4, none);
+        let empty = data::PlacedPage { map: data::EMPTY, ..bytemuck::Zeroable::zeroed() };
+        let all = vec![empty; count(places)];
+        let placed = buffer(device, &all, BufferUsages::STORAGE);
+        // New buffers hold zeros: no entry, no stamp, no bias.
+        queue.write_buffer(&calls, 0, bytemuck::cast_slice(&[0u32, 1, 1, 0, 6, 0, 0, 0]));
+        let allocate_group = group(
+            device,
+            &self.pipelines.allocate_layout,
+            &[
+                &self.uniforms.frame,
+                &table_buffer,
+                &levels,
+                &placed,
+                &wanted,
+                &state,
+                &fresh,
+                &lists,
+                &calls,
+                &boxes,
+                &shown,
+            ],
+        );
+        let draw_group =
+            group(device, &self.pipelines.draw_layout, &[&self.uniforms.pool, &fresh, maps]);
+        self.seen = None;
+        self.held = Some(Held {
+            levels,
+            table: table_buffer,
+            stamps,
+            wanted,
+            state,
+            calls,
+            boxes,
+            shown,
+            room,
+            allocate_group,
+            draw_group,
+            shown_group: None,
+            pending: Pending {
+                number: 0,
+                room: places,
+                least_bias: 0.0,
+                error: 0.0,
+                has_budget: true,
+            },
+            _others: [placed, fresh, lists],
+        });
+    }
+}
+
+fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> BindGroup {
+    let entries = (0..).zip(buffers);
+    let entries = entries
+        .map(|(binding, buffer)| BindGroupEntry { binding, resource: buffer.as_entire_binding() });
+    device.create_bind_group(&BindGroupDescriptor {
+        label: Some("shadow pages"),
+        layout,
+        entries: &entries.collect::<Vec<_>>(),
+    })
+}
+
+impl Pipelines {
+    fn new(
+        device: &Device,
+        support: &Support,
+        filter: &Filter,
+        lookup_layout: &BindGroupLayout,
+    ) -> Self {
+        const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
+        const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
+        const WRITTEN: BufferBindingType = BufferBindingType::Storage { read_only: false };
+        let of_buffer =
+            |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+        let layout = |visibility: ShaderStages, types: &[BindingType]| {
+            let entries = (0..).zip(types);
+            let entries = entries.map(|(binding, &ty)| BindGroupLayoutEntry {
+                binding,
+                visibility,
+                ty,
+                count: None,
+            });
+            device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+                label: Some("shadow pages"),
+                entries: &entries.collect::<Vec<_>>(),
+            })
+        };
+        let request_layouts = [false, true].map(|multisampled| {
+            let depths = BindingType::Texture {
+                sample_type: TextureSampleType::Depth,
+                view_dimension: TextureViewDimension::D2,
+                multisampled,
+            };
+            let others = [UNIFORM, WRITTEN, WRITTEN, WRITTEN].map(of_buffer);
+            layout(ShaderStages::COMPUTE, &[&[depths][..], &others].concat())
+        });
+        let of_allocation = [
+            UNIFORM, WRITTEN, READ, WRITTEN, READ, WRITTEN, WRITTEN, WRITTEN, WRITTEN, READ,
+            WRITTEN,
+        ];
+        let allocate_layout = layout(ShaderStages::COMPUTE, &of_allocation.map(of_buffer));
+        let draw_layout = layout(ShaderStages::VERTEX, &[UNIFORM, READ, READ].map(of_buffer));
+        let module = |text: String| {
+            device.create_shader_module(ShaderModuleDescriptor {
+                label: Some("shadow pages"),
+                source: ShaderSource::Wgsl(text.into()),
+            })
+        };
+        let pipeline_layout = |layouts: &[Option<&BindGroupLayout>]| {
+            device.create_pipeline_layout(&PipelineLayoutDescriptor {
+                label: Some("shadow pages"),
+                bind_group_layouts: layouts,
+                immediate_size: 0,
+            })
+        };
+        let compute = |module: &_, layouts: &[Option<&BindGroupLayout>], entry_point| {
+            device.create_compute_pipeline(&ComputePipelineDescriptor {
+                label: Some("shadow pages"),
+                layout: Some(&pipeline_layout(layouts)),
+                module,
+                entry_point: Some(entry_point),
+                compilation_options: PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        };
+        let requests = [false, true].map(|is_multisampled| {
+            let module = module(wgsl::page_request(filter, is_multisampled));
+            let own = &request_layouts[usize::from(is_multisampled)];
+            compute(&module, &[Some(own), Some(lookup_layout)], "shadow_page_request")
+        });
+        let allocation = module(wgsl::page_allocate());
+        let clearing = module(wgsl::page_clear(filter, support));
+        Self {
+            begin: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_begin"),
+            allocate: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_allocate"),
+            clear: device.create_render_pipeline(&RenderPipelineDescriptor {
+                label: Some("shadow pages"),
+                layout: Some(&pipeline_layout(&[Some(&draw_layout)])),
+                vertex: VertexState {
+                    module: &clearing,
+                    entry_point: Some("shadow_page_clear_vertex"),
+                    compilation_options: PipelineCompilationOptions::default(),
+                    buffers: &[],
+                },
+                primitive: PrimitiveState::default(),
+                depth_stencil: Some(depth_state(CompareFunction::Always)),
+                multisample: MultisampleState::default(),
+                fragment: None,
+                multiview_mask: None,
+                cache: None,
+            }),
+            requests,
+            request_layouts,
+            allocate_layout,
+            draw_layout,
+        }
+    }
+}
