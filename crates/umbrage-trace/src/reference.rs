@@ -1,6 +1,11 @@
+//! Plans executed by ray tracing.
+
+mod pages;
+
 use crate::statistics::StatisticMap;
 use crate::{Error, Progress, Ray, Sample, Tracer};
 use glam::{DVec2, DVec3};
+use pages::Pages;
 use rayon::prelude::*;
 use umbrage::visibility::statistic::Channels;
 use umbrage::visibility::{
@@ -59,13 +64,21 @@ impl DepthMap {
         texels.try_reserve_exact(count).map_err(|_| Error::Memory { resolution })?;
         texels.resize(count, 1.0);
         texels.par_chunks_mut(width).enumerate().for_each(|(row, texels)| {
-            for (column, texel) in texels.iter_mut().enumerate() {
-                let center = DVec2::new(column as f64, row as f64) + 0.5 - f64::from(gutter);
-                *texel = depth_at(tracer, map, center).unwrap_or(1.0);
-            }
+            trace_row(tracer, map, gutter, row, texels);
             progress(1);
         });
         Ok(Self { resolution, gutter, drawn, texels })
+    }
+
+    /// As [`render`](Self::render), on the thread that asks. The map must be as small as a page.
+    fn of_page(tracer: &Tracer<'_>, map: &ShadowMap, gutter: u32) -> Self {
+        let drawn = map.resolution.map(|n| n + 2 * gutter);
+        let [width, height] = drawn.map(|n| n as usize);
+        let mut texels = vec![1.0; width * height];
+        for (row, texels) in texels.chunks_mut(width).enumerate() {
+            trace_row(tracer, map, gutter, row, texels);
+        }
+        Self { resolution: map.resolution, gutter, drawn, texels }
     }
 
     /// Number of rows that [`render`](Self::render) reports.
@@ -97,6 +110,14 @@ impl DepthMap {
     }
 }
 
+/// Sets the depths of a map's row of this index, counted from the begin of its gutter.
+fn trace_row(tracer: &Tracer<'_>, map: &ShadowMap, gutter: u32, row: usize, texels: &mut [f32]) {
+    for (column, texel) in texels.iter_mut().enumerate() {
+        let center = DVec2::new(column as f64, row as f64) + 0.5 - f64::from(gutter);
+        *texel = depth_at(tracer, map, center).unwrap_or(1.0);
+    }
+}
+
 /// Bytes of each texel that lookups read.
 fn bytes_per_texel(filter: Filter) -> u32 {
     match filter {
@@ -121,10 +142,14 @@ fn depth_at(tracer: &Tracer<'_>, map: &ShadowMap, texel: DVec2) -> Option<f32> {
     Some(depth.clamp(0.0, 1.0) as f32)
 }
 
-/// A plan executed by ray tracing: the depths of its maps, and lookups into them.
-#[derive(Clone, Debug)]
+/// A plan executed by ray tracing: the depths of its maps, and lookups into them. If the plan has
+/// [pages](umbrage::paged), each of them is traced when it is first looked up.
+#[derive(Debug)]
 pub struct Reference<'a> {
     plan: &'a Plan,
+    /// The pages, if the plan has pages in place of maps.
+    pages: Option<Pages<'a>>,
+    /// Empty if there are pages.
     maps: Vec<DepthMap>,
     /// One for each map if the plan's filter is a prefilter, else empty.
     statistics: Vec<StatisticMap>,
@@ -167,15 +192,19 @@ pub struct MapTexel {
 impl<'a> Reference<'a> {
     /// Renders the depths of all maps, with the gutter that the plan's filter needs, and the
     /// prefiltered maps if the filter is a prefilter. `progress` is told of each of the
-    /// [`rows`](Self::rows) of texels.
+    /// [`rows`](Self::rows) of texels. For plans with pages nothing is rendered yet.
     ///
     /// # Errors
     /// [`Error::Memory`] if a map does not fit into memory.
     pub fn render(
-        tracer: &Tracer<'_>,
+        tracer: &'a Tracer<'a>,
         plan: &'a Plan,
         progress: Progress<'_>,
     ) -> Result<Self, Error> {
+        if plan.paging.is_some() {
+            let pages = Some(Pages::new(tracer));
+            return Ok(Self { plan, pages, maps: Vec::new(), statistics: Vec::new() });
+        }
         let filter = plan.filter;
         let render = |map: &ShadowMap| {
             let drawn = filter.drawn_texels(map.resolution);
@@ -191,20 +220,24 @@ impl<'a> Reference<'a> {
             }
             _ => Vec::new(),
         };
-        Ok(Self { plan, maps, statistics })
+        Ok(Self { plan, pages: None, maps, statistics })
     }
 
-    /// Number of rows of texels that [`render`](Self::render) reports.
+    /// Number of rows of texels that [`render`](Self::render) reports; 0 for plans with pages.
     pub fn rows(plan: &Plan) -> u64 {
+        if plan.paging.is_some() {
+            return 0;
+        }
         let full = plan.maps.iter().filter(|m| !m.is_empty());
         full.map(|m| u64::from(plan.filter.drawn_texels(m.resolution)[1])).sum()
     }
 
-    /// Memory that the maps which lookups read would take on a GPU, gutters and mip levels
-    /// included, bytes.
+    /// Memory that the maps, or the pages so far, which lookups read would take on a GPU, gutters
+    /// and mip levels included, bytes.
     pub fn bytes(&self) -> u64 {
         let stored = |m: &DepthMap| m.texels.len() as u64;
-        let texels = self.maps.iter().map(stored).sum::<u64>()
+        let of_pages = self.pages.as_ref().map_or(0, |pages| pages.drawn_texels(self.plan));
+        let texels = (self.maps.iter().map(stored).sum::<u64>() + of_pages)
             * u64::from(bytes_per_texel(self.plan.filter));
         // Each mip level has a quarter of the texels of the level before it.
         let levels = match self.plan.filter {
@@ -217,7 +250,12 @@ impl<'a> Reference<'a> {
         levels.map(|level| texels >> (2 * level)).sum()
     }
 
-    /// The depths of the maps, in the order of [`Plan::maps`].
+    /// Number of pages that have been looked up so far; 0 if the plan has none.
+    pub fn pages(&self) -> usize {
+        self.pages.as_ref().map_or(0, Pages::len)
+    }
+
+    /// The depths of the maps, in the order of [`Plan::maps`]; empty if the plan has pages.
     pub fn depth_maps(&self) -> &[DepthMap] {
         &self.maps
     }
@@ -231,9 +269,14 @@ impl<'a> Reference<'a> {
             return 0.0;
         }
         let surface = &sample.surface;
+        let (position, normal) = (surface.position, surface.geometric_normal);
+        if let Some(pages) = &self.pages {
+            let place = self.plan.page_place(light, position);
+            let lit = place.and_then(|place| pages.visibility(self.plan, &place, position, normal));
+            return self.plan.faded(position, lit.map_or(1.0, f64::from)) as f32;
+        }
         let (mut sum, mut shares) = (0.0, 0.0);
-        for (index, share) in self.plan.lookup(light, surface.position) {
-            let (position, normal) = (surface.position, surface.geometric_normal);
+        for (index, share) in self.plan.lookup(light, position) {
             let value = self.plan.receiver(index, position, normal).map_or(1.0, |r| {
                 let depths = &self.maps[index];
                 let statistics = self.statistics.get(index);
@@ -244,12 +287,18 @@ impl<'a> Reference<'a> {
             shares += share;
         }
         let visibility = if shares > 0.0 { sum / shares } else { 1.0 };
-        self.plan.faded(surface.position, visibility) as f32
+        self.plan.faded(position, visibility) as f32
     }
 
     /// The map with the largest share in a point's visibility under one of the plan's lights, and
-    /// the point's position in that map; `None` if no map serves the point.
+    /// the point's position in that map; `None` if no map serves the point. In plans with pages,
+    /// the map is the window of the point's level.
     pub fn texel(&self, light: usize, world_position: DVec3) -> Option<MapTexel> {
+        if self.pages.is_some() {
+            let place = self.plan.page_place(light, world_position)?;
+            let texel = pages::texel_in_window(self.plan, &place)?;
+            return Some(MapTexel { map: place.map, texel });
+        }
         let maps = self.plan.lookup(light, world_position);
         let (index, _) = maps.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let map = &self.plan.maps[index];

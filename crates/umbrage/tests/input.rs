@@ -437,6 +437,7 @@ fn check_sound(plan: &Plan, size: Size, what: &str) {
             Size::Budget(budget) => assert!(plan.texels() <= budget, "{what}"),
             Size::Exact(size) => assert!(map.is_empty() || map.resolution == size, "{what}"),
             Size::MaxError(pixels) => assert!(e.max <= pixels * (1.0 + 1e-9), "{what}"),
+            Size::Needed => assert!(plan.paging.is_some(), "{what}"),
         }
         if map.is_empty() {
             assert!(!map.may_cast(Aabb::new(DVec3::splat(-1e12), DVec3::splat(1e12))), "{what}");

@@ -70,10 +70,10 @@ impl Slot {
 }
 
 /// The word that fills a slot of a technique's text, or whose meaning the text has without it: no
-/// filter is `hard`, and no size is `1024`. `None` if the text is no technique, or has no such
-/// partition.
+/// filter is `hard`, and no size is `1024`. `None` if the text is no technique, or if it means no
+/// word: no such partition, or the size of paged maps, which have what the view needs.
 pub fn written(text: &str, slot: Slot) -> Option<Written<'_>> {
-    slot.read(Texts::of(text).ok()?.0[slot as usize].or(slot.default_text())?).ok()
+    slot.read(Texts::of(text).ok()?.word(slot)?).ok()
 }
 
 /// The text with another word in a slot, as in `with_word("lispsm:vsm", Slot::Filter,
@@ -113,7 +113,7 @@ pub fn with_option(
     value: Option<&str>,
 ) -> Result<String, ParseError> {
     let texts = Texts::of(text)?;
-    let Some(word) = texts.0[slot as usize].or(slot.default_text()) else {
+    let Some(word) = texts.word(slot) else {
         let problem = format!("`{text}` has no `{}{}`", slot.prefix(), slot.words()[0]);
         return Err(ParseError::new(problem));
     };
@@ -169,6 +169,13 @@ impl<'a> Texts<'a> {
         let slices = parts.partitions.iter().copied().find(is_slices);
         let faces = parts.partitions.iter().copied().find(|part| !is_slices(part));
         Ok(Self([parts.warp, slices, faces, parts.filter, parts.size]))
+    }
+
+    /// The word in a slot, or the one that is meant where there is none.
+    fn word(&self, slot: Slot) -> Option<&'a str> {
+        let is_paged = self.0[Slot::Warp as usize].is_some_and(layouts::is_paged);
+        let default = slot.default_text().filter(|_| slot != Slot::Size || !is_paged);
+        self.0[slot as usize].or(default)
     }
 
     /// The text with this word in a slot, if that is a technique.

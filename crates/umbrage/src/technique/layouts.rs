@@ -1,7 +1,8 @@
 //! The language's words for warps, partitions and numbers of texels.
 
 use super::language::{
-    FILTERS, Kind, ParseError, Short, Word, WordOption, Written, count, split_once, write_word,
+    FILTERS, Kind, ParseError, Short, Word, WordOption, Written, count, split_once, split_options,
+    write_word,
 };
 use super::scale::Scale;
 use super::{Cover, Faces, MAX_SIDE, Objective, Partition, Size, Splits, Warp};
@@ -123,6 +124,11 @@ pub(super) const WARPS: &[Word] = &[
 
 /// The word of paged maps.
 const PAGED: &str = "paged";
+
+/// Whether a word, with its options, is that of paged maps.
+pub(super) fn is_paged(text: &str) -> bool {
+    split_options(text).is_ok_and(|(head, _)| head == PAGED)
+}
 
 /// The error of paged maps that need not be written, pixels.
 const PAGED_ERROR: f64 = 1.0;

@@ -151,6 +151,12 @@ fn bad_techniques_say_what_would_be_right() {
         ("tsm(focus=inf)", "finite"),
         ("tsm(focus=3", "`)`"),
         ("tsm)", "`(`"),
+        ("page", "did you mean `paged`?"),
+        ("paged(eror=1)", "did you mean `paged(error=PIXELS)`?"),
+        ("paged(error)", "must be written `error=PIXELS`"),
+        ("paged(error=0.2)", "0.25 to 8 pixels"),
+        ("paged(error=9)", "0.25 to 8 pixels"),
+        ("paged(error=NaN)", "0.25 to 8 pixels"),
         ("uniform+", "unknown partition `+`"),
         ("uniform+faces", "did you mean `+face`?"),
         ("uniform+z", "did you mean `+zK`?"),
@@ -260,6 +266,8 @@ fn complaints_are_about_a_part_of_the_text() {
     ] {
         assert_eq!(technique.part(field).as_deref(), Some(part), "{field}");
     }
+    let paged = parsed("paged(error=0.5)");
+    assert_eq!(paged.part("technique.cover").as_deref(), Some("paged(error=0.5)"));
     for field in ["camera.near", "limits.max_side", "", "bounds.receivers"] {
         assert_eq!(technique.part(field), None, "{field}");
     }
@@ -358,7 +366,42 @@ fn rust_code_makes_the_technique() -> Result<(), umbrage::Error> {
             ..Technique::default()
         }
     );
+    check!(
+        "paged",
+        Technique {
+            warp: Warp::Uniform,
+            cover: Cover::Paged { error: 1.0 },
+            size: Size::Needed,
+            ..Technique::default()
+        }
+    );
+    check!(
+        "paged(error=0.25):pcf3@2048",
+        Technique {
+            warp: Warp::Uniform,
+            cover: Cover::Paged { error: 0.25 },
+            filter: Filter::Pcf { n: 3 },
+            size: Size::Budget(2048 * 2048),
+            ..Technique::default()
+        }
+    );
     Ok(())
+}
+
+/// Pages are as many as the view needs, unless a text limits them.
+#[test]
+fn pages_need_no_size() {
+    let paged = parsed("paged");
+    assert_eq!((paged.warp, paged.cover), (Warp::Uniform, Cover::Paged { error: 1.0 }));
+    assert_eq!((paged.size, paged.to_string()), (Size::Needed, "paged".to_owned()));
+    assert_eq!(parsed("paged@1024").size, Size::Budget(1024 * 1024));
+    assert_eq!(parsed("paged@1024").to_string(), "paged@1024");
+    assert_eq!(parsed("paged(error=1)"), paged);
+    let told = language::explain("paged(error=0.5):pcf3@2048");
+    assert_eq!(
+        told.iter().map(|(word, _)| word.as_str()).collect::<Vec<_>>(),
+        ["paged", "error=0.5", "pcf3", "@2048"]
+    );
 }
 
 proptest! {

@@ -1,6 +1,7 @@
 //! Random techniques of the language.
 
 use proptest::prelude::*;
+use umbrage::paged::{LEAST_BUDGET, LEAST_ERROR, MOST_ERROR};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use umbrage::{Cover, Faces, Objective, Partition, Size, Splits, Technique, Warp};
@@ -110,7 +111,7 @@ fn size() -> impl Strategy<Value = Size> {
 }
 
 prop_compose! {
-    pub(crate) fn technique()(
+    fn of_maps()(
         (warp, cover) in spread(),
         partition in partition(),
         filter in filter(),
@@ -118,4 +119,23 @@ prop_compose! {
     ) -> Technique {
         Technique { warp, cover, partition, filter, size }
     }
+}
+
+prop_compose! {
+    fn of_pages()(
+        error in prop_oneof![Just(1.0), LEAST_ERROR..=MOST_ERROR],
+        filter in filter().prop_filter("pages have no prefilters", |f| f.prefilter().is_none()),
+        size in prop_oneof![
+            Just(Size::Needed),
+            (512..=65536u64).prop_map(|side| Size::Budget(side * side)),
+            (LEAST_BUDGET..=1 << 32).prop_map(Size::Budget),
+        ],
+    ) -> Technique {
+        let cover = Cover::Paged { error };
+        Technique { warp: Warp::Uniform, cover, filter, size, ..Technique::default() }
+    }
+}
+
+pub(crate) fn technique() -> impl Strategy<Value = Technique> {
+    prop_oneof![4 => of_maps(), 1 => of_pages()]
 }

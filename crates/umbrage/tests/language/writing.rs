@@ -29,6 +29,11 @@ fn what_is_begun_is_completed() {
         ("ad|+z4@512", &["adaptive+z4@512"]),
         ("un|", &["unfocused", "uniform"]),
         ("lam|", &["lambda=12.5"]),
+        ("pag|", &["paged"]),
+        ("paged(|", &["paged(error=0.5)"]),
+        ("paged+z|", &[]),
+        ("paged:v|", &[]),
+        ("paged:pcf3@2|", &["paged:pcf3@2048"]),
         ("lambda=|", &["lambda=12.5"]),
         ("no|", &["none"]),
         ("adaptive+|", &["adaptive+z4", "adaptive+face"]),
@@ -138,6 +143,7 @@ fn slots_are_read() {
     for (text, expected) in [
         ("psm", [Some("psm"), None, None, Some("hard"), Some("1024")]),
         ("none", [Some("adaptive"), None, None, Some("none"), Some("1024")]),
+        ("paged", [Some("paged"), None, None, Some("hard"), None]),
         ("none@2", [None; 5]),
     ] {
         assert_eq!(Slot::ALL.map(|slot| read(text, slot)), expected, "{text}");
@@ -164,6 +170,10 @@ fn words_change() {
         ("none", Slot::Slices, Some("z4"), "adaptive+z4:none"),
         ("none", Slot::Filter, Some("hard"), "adaptive:hard"),
         ("psm", Slot::Warp, None, "adaptive"),
+        ("psm:pcf3@2048", Slot::Warp, Some("paged"), "paged:pcf3@2048"),
+        ("paged(error=0.5):pcf3", Slot::Warp, Some("psm"), "psm:pcf3"),
+        ("paged(error=0.5)", Slot::Size, Some("2048"), "paged(error=0.5)@2048"),
+        ("paged@2048", Slot::Size, None, "paged"),
     ] {
         assert_eq!(with_word(text, slot, word).as_deref(), Ok(expected), "{text} {word:?}");
     }
@@ -173,6 +183,11 @@ fn words_change() {
         ("uniform(stable)", Slot::Faces, "face", "`+face`: stable maps do not turn"),
         ("no technique", Slot::Size, "64", "unknown warp"),
         ("psm", Slot::Warp, "psm:pcf3", "unknown warp `psm:pcf3`"),
+        ("psm+z4", Slot::Warp, "paged", "no slices and no faces"),
+        ("psm:vsm", Slot::Warp, "paged", "`:vsm`: pages have no prefilters"),
+        ("paged", Slot::Filter, "msm", "`:msm`: pages have no prefilters"),
+        ("paged", Slot::Size, "64", "`@64`: pages share a budget of at least"),
+        ("paged", Slot::Size, "1px", "`@1px`: pages share a budget"),
         ("psm", Slot::Faces, "z2", "`z2` does not belong there"),
     ] {
         let error = with_word(text, slot, Some(word)).unwrap_err().to_string();
@@ -189,6 +204,8 @@ fn options_change() {
         ("psm:vsm(half)", Slot::Filter, "half", None, "psm:vsm"),
         ("psm:vsm", Slot::Filter, "half", None, "psm:vsm"),
         ("uniform", Slot::Warp, "stable", Some(""), "uniform(stable)"),
+        ("paged", Slot::Warp, "error", Some("0.5"), "paged(error=0.5)"),
+        ("paged(error=2):pcf3@2048", Slot::Warp, "error", None, "paged:pcf3@2048"),
         // What excludes the new option goes, and what it needs comes.
         (
             "psm+z4(fitted,overlap=0.1)",
@@ -213,6 +230,8 @@ fn options_change() {
         ("uniform+face", Slot::Warp, "stable", "", "`+face`: stable maps do not turn"),
         ("uniform(stable)+z2", Slot::Slices, "fitted", "", "stable maps cannot be fitted"),
         ("psm+z1", Slot::Slices, "at", "5", "`+z2` or more"),
+        ("paged", Slot::Warp, "error", "9", "0.25 to 8 pixels"),
+        ("paged", Slot::Warp, "stable", "", "did you mean `paged(error=PIXELS)`?"),
     ] {
         let error = with_option(text, slot, option, Some(value)).unwrap_err().to_string();
         assert!(error.contains(expected), "{text} {option} {value}: {error}");
