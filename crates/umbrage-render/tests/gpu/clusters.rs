@@ -1,12 +1,12 @@
 //! Scenes drawn from clusters in levels of detail against the same scenes drawn whole.
 
 use crate::pictures::read;
-use crate::{GPU, Set, scene};
+use crate::{GPU, Set, mesh_inputs, scene};
 use glam::{DAffine3, DMat3, DVec3};
 use umbrage::{Camera, Light, LookAt, PointLight, Technique};
-use umbrage_clusters::{ClusterMesh, MeshInput, build_all};
+use umbrage_clusters::{ClusterMesh, build_all};
 use umbrage_render::{EdgeOn, Error, FrameTarget, Renderer, Sample, SceneBuffers, Shading};
-use umbrage_scene::{Alpha, Moved, Scene};
+use umbrage_scene::{Moved, Scene};
 use umbrage_testing::needs;
 use umbrage_trace::View;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -14,18 +14,7 @@ use umbrage_wgpu::{Casters, ShadowOptions};
 const IMAGE: [u32; 2] = [240, 135];
 
 fn clusters(scene: &Scene) -> Vec<ClusterMesh> {
-    let inputs: Vec<MeshInput<'_>> = scene
-        .meshes
-        .iter()
-        .map(|mesh| MeshInput {
-            positions: &mesh.positions,
-            normals: &mesh.normals,
-            uvs: &mesh.uvs,
-            triangles: &mesh.triangles,
-            is_masked: matches!(scene.materials[mesh.material].alpha, Alpha::Mask { .. }),
-        })
-        .collect();
-    build_all(&inputs, &|_| {}).unwrap()
+    build_all(&mesh_inputs(scene), &|_| {}).unwrap()
 }
 
 fn clustered(scene: &Scene) -> SceneBuffers {

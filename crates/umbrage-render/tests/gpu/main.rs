@@ -2,6 +2,7 @@
 
 mod clusters;
 mod overlays;
+mod pages;
 mod parity;
 mod pictures;
 mod poses;
@@ -11,8 +12,9 @@ mod window;
 use std::path::Path;
 use std::sync::LazyLock;
 use umbrage::{Bounds, BoxTree, Camera, Light, Limits, Plan, Planner, Technique};
+use umbrage_clusters::MeshInput;
 use umbrage_render::Gpu;
-use umbrage_scene::Scene;
+use umbrage_scene::{Alpha, Scene};
 use umbrage_testing::third_party_scenes;
 use umbrage_trace::Tracer;
 
@@ -28,6 +30,16 @@ pub(crate) fn scene(name: &str) -> Scene {
     }
     let path = Path::new(third_party_scenes!()).join(name);
     umbrage_scene::load(&path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The meshes of a scene, as clusters are made of them.
+pub(crate) fn mesh_inputs<'a>(scene: &'a Scene) -> Vec<MeshInput<'a>> {
+    let input = |mesh: &'a umbrage_scene::Mesh| {
+        let umbrage_scene::Mesh { positions, normals, uvs, triangles, material, .. } = mesh;
+        let is_masked = matches!(scene.materials[*material].alpha, Alpha::Mask { .. });
+        MeshInput { positions, normals, uvs, triangles, is_masked }
+    };
+    scene.meshes.iter().map(input).collect()
 }
 
 /// A scene with its default view, prepared for ray tracing.

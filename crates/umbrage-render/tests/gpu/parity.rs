@@ -1,6 +1,7 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
-use crate::{GPU, Set, scene};
+use crate::{GPU, Set, mesh_inputs, scene};
+use umbrage_clusters::build_finest;
 use glam::{DAffine3, DVec3, Quat, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
@@ -112,6 +113,10 @@ fn draw(
     support: Support,
 ) -> Vec<Sample> {
     let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
+    if plan.paging.is_some() {
+        let finest = || build_finest(&mesh_inputs(set.scene)).unwrap();
+        buffers.make_pages(&GPU, set.scene, finest).unwrap();
+    }
     let mut renderer = Renderer::with_support(&GPU, &buffers, options, support).unwrap();
     renderer.draw_maps(plan, Casters::Unmoved, None).unwrap();
     renderer.samples(shading, 0..set.camera.image()[1], 1, true).unwrap()
@@ -154,11 +159,16 @@ pub(crate) fn agrees_with(name: &str, set: &Set<'_>, technique: &Technique) {
     agrees_under(name, set, set.light(), technique);
 }
 
+fn options_for(technique: &Technique) -> ShadowOptions {
+    let pages = technique.paged_error().is_some();
+    ShadowOptions { filter: technique.filter, pages, ..ShadowOptions::default() }
+}
+
 /// Compares one technique in a light.
 fn agrees_under(name: &str, set: &Set<'_>, light: Light, technique: &Technique) {
     let plan = set.plan(&[light], technique);
     let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
-    let options = ShadowOptions { filter: technique.filter, ..ShadowOptions::default() };
+    let options = options_for(technique);
     let samples = draw(set, &plan, &shading, &options, GPU.support());
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     let difference = compare(set, &plan, (0, &light), &samples, &reference);
@@ -575,9 +585,8 @@ fn agrees_with_lights(name: &str, set: &Set<'_>, lights: &[Light], technique: &T
     for (index, light) in lights.iter().enumerate() {
         let shading = Shading { camera: &set.camera, light, light_index: index as u32 };
         let options = ShadowOptions {
-            filter: plan.filter,
             buffers: LookupBuffers::for_technique(technique, lights.len()),
-            ..ShadowOptions::default()
+            ..options_for(technique)
         };
         let samples = draw(set, &plan, &shading, &options, GPU.support());
         let difference = compare(set, &plan, (index, light), &samples, &reference);
