@@ -74,6 +74,12 @@ impl Renderer<'_> {
         let Some(camera) = plan.paging.as_ref().map(|paging| paging.camera) else {
             return Ok(Vec::new());
         };
+        if self.pages.is_none() {
+            return Err(Error::Invalid {
+                field: "options.pages",
+                problem: "must be true for a plan with pages, is false".into(),
+            });
+        }
         let mut trials = 0;
         loop {
             let target = self.draw_depths(&camera, timer.as_deref_mut())?;

@@ -133,7 +133,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
     }
     if pages {
         add_pages(&mut shader, &filter);
-        shader.add([module!("served/pages"), module!("ends/page")]);
+        shader.add([module!("served/pages"), module!("page_corner")]);
     } else {
         shader.add([module!("served/maps")]);
     }
@@ -257,7 +257,9 @@ fn places(pattern: Pattern, n: u32) -> Vec<[f32; 2]> {
 
 /// Adds the comparisons at these places of a square or a disc.
 fn add_square(shader: &mut Shader, options: &ShadowOptions, places: &[[f32; 2]]) {
-    if !options.pages {
+    if options.pages {
+        shader.add([module!("ends/page")]);
+    } else {
         shader.constant("SHADOW_GUTTER", options.filter.reach_texels() as f32);
         shader.add([module!("ends/map")]);
     }

@@ -1,9 +1,15 @@
 //! Plans with pages: the GPU against the reference, and pages that are kept against new ones.
 
-use crate::parity::agrees_with;
-use crate::{Set, scene};
-use umbrage::Technique;
+use crate::parity::{agrees_with, agrees_with_lights, four_lights};
+use crate::{GPU, Set, mesh_inputs, scene};
+use glam::DVec3;
+use umbrage::{Aabb, Camera, Light, Plan, Technique};
+use umbrage_clusters::build_finest;
+use umbrage_render::{Renderer, SceneBuffers, Shading};
+use umbrage_scene::{Lens, Scene};
 use umbrage_testing::needs;
+use umbrage_trace::View;
+use umbrage_wgpu::{Casters, PageCounts, ShadowOptions, Support};
 
 const IMAGE: [u32; 2] = [240, 135];
 
@@ -21,4 +27,173 @@ fn agrees(name: &str, techniques: &[&str]) {
 fn built_in_scenes_have_the_pages_of_the_reference() {
     agrees("town", &["paged", "paged(error=0.5):pcf3"]);
     agrees("fence", &["paged(error=2)"]);
+}
+
+/// A sun, a cone, a wide cone and a bulb in one plan.
+#[needs(gpu)]
+#[test]
+fn lamps_have_pages() {
+    let scene = scene("lantern");
+    let mut set = Set::new(&scene, IMAGE);
+    let lights = four_lights(&set);
+    let technique: Technique = "paged:pcf2".parse().unwrap();
+    agrees_with_lights("lantern", &set, &lights, &technique);
+    let mut view = scene.default_view();
+    view.eye += (view.target - view.eye) * 0.5;
+    view.lens = Lens::Orthographic { height: view.eye.distance(view.target) };
+    view.near = -0.1 * view.eye.distance(view.target);
+    set.camera = view.camera(IMAGE).unwrap();
+    agrees_with_lights("lantern", &set, &lights, &technique);
+}
+
+#[needs(gpu)]
+#[test]
+fn penumbrae_have_pages() {
+    agrees("town", &["paged:pcss", "paged(error=2):pcf3(blur=2px)"]);
+}
+
+/// Pages that share too few texels are coarser, on the GPU as in the plan.
+#[needs(gpu)]
+#[test]
+fn a_full_pool_is_as_coarse_as_planned() {
+    let scene = scene("town");
+    let set = Set::new(&scene, IMAGE);
+    let light = set.light();
+    let technique: Technique = "paged(error=0.25)@640".parse().unwrap();
+    let mut plan = set.plan(&[light], &technique);
+    let view = View::new(&set.tracer, set.camera, light, 1).unwrap();
+    let band = view.band(0..IMAGE[1], &|_| {});
+    let seen = band.samples().iter().flatten().map(|s| s.surface.position);
+    plan.fit_pages(&seen.collect::<Vec<_>>());
+    let (drawn, counts) = Drawn::of(&set, &plan, &technique);
+    let bias = plan.paging.as_ref().unwrap().bias;
+    assert!(bias > 1.0 && (f64::from(counts.bias) - bias).abs() < 0.1, "{bias} {counts:?}");
+    assert_eq!((counts.missing, counts.room), (0, 100));
+    // Without the plan's help, the device finds out how coarse levels must be.
+    plan.set_page_bias(0.0);
+    let (alone, counts) = Drawn::of(&set, &plan, &technique);
+    assert!(f64::from(counts.bias) > bias - 0.1 && counts.missing == 0, "{bias} {counts:?}");
+    let differ = drawn.differ(&alone);
+    assert!(differ * 20 < drawn.visibility.len(), "{differ} of {}", drawn.visibility.len());
+}
+
+/// The visibility in each pixel.
+struct Drawn {
+    visibility: Vec<f32>,
+}
+
+impl Drawn {
+    fn of(set: &Set<'_>, plan: &Plan, technique: &Technique) -> (Self, PageCounts) {
+        let buffers = buffers(set.scene);
+        let mut renderer = Renderer::new(&GPU, &buffers, &options(technique)).unwrap();
+        renderer.draw_maps(plan, Casters::Unmoved, None).unwrap();
+        let drawn = Self::by(&mut renderer, &set.camera, &set.light());
+        (drawn, renderer.page_counts().unwrap())
+    }
+
+    fn by(renderer: &mut Renderer<'_>, camera: &Camera, light: &Light) -> Self {
+        let shading = Shading { camera, light, light_index: 0 };
+        let samples = renderer.samples(&shading, 0..IMAGE[1], 1, false).unwrap();
+        Self { visibility: samples.iter().map(|s| s.visibility).collect() }
+    }
+
+    fn differ(&self, other: &Self) -> usize {
+        let pairs = self.visibility.iter().zip(&other.visibility);
+        pairs.filter(|(a, b)| (*a - *b).abs() > 0.5).count()
+    }
+}
+
+fn buffers(scene: &Scene) -> SceneBuffers {
+    let buffers = SceneBuffers::new(&GPU, scene, false).unwrap();
+    let finest = || build_finest(&mesh_inputs(scene)).unwrap();
+    buffers.make_pages(&GPU, scene, finest).unwrap();
+    buffers
+}
+
+fn options(technique: &Technique) -> ShadowOptions {
+    ShadowOptions { filter: technique.filter, pages: true, ..ShadowOptions::default() }
+}
+
+/// Cameras that walk and turn, at 1.4 m/s and 60 frames a second.
+fn walk(scene: &Scene, steps: u32) -> impl Iterator<Item = Camera> + use<> {
+    let mut view = scene.default_view();
+    (0..steps).map(move |_| {
+        let way = (view.target - view.eye).normalize();
+        let side = DVec3::Y.cross(way).normalize_or_zero();
+        let step = way * (1.4 / 60.0);
+        view.eye += step;
+        view.target += step + side * 0.01;
+        view.camera(IMAGE).unwrap()
+    })
+}
+
+/// Pages that were kept show what new ones do, and few are drawn while the camera walks; none where
+/// it stands still.
+#[needs(gpu)]
+#[test]
+fn pages_are_kept() {
+    for (name, text) in [("town", "paged"), ("grove:40", "paged:pcf3")] {
+        let scene = scene(name);
+        let mut set = Set::new(&scene, IMAGE);
+        let light = set.light();
+        let technique: Technique = text.parse().unwrap();
+        let buffers = buffers(&scene);
+        let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+        let mut shares = Vec::new();
+        for camera in walk(&scene, 40) {
+            set.camera = camera;
+            let plan = set.plan(&[light], &technique);
+            renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+            let counts = renderer.page_counts().unwrap();
+            assert_eq!((counts.missing, counts.bias), (0, 0.0), "{name}");
+            shares.push(f64::from(counts.drawn) / f64::from(counts.wanted));
+        }
+        let after_first = &shares[1..];
+        let mean = after_first.iter().sum::<f64>() / after_first.len() as f64;
+        assert!(shares[0] == 1.0 && mean < 0.1, "{name}: {shares:?}");
+        let plan = set.plan(&[light], &technique);
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        assert_eq!(renderer.page_counts().unwrap().drawn, 0, "{name}");
+        let kept = Drawn::by(&mut renderer, &set.camera, &light);
+        let (fresh, _) = Drawn::of(&set, &plan, &technique);
+        // Rounding relative to another eye may move an edge over a texel's centre.
+        let differ = kept.differ(&fresh);
+        assert!(differ * 2000 <= fresh.visibility.len(), "{name}: {differ} pixels differ");
+        // Casters that moved dirty the pages that they cast into, and no others.
+        let here = set.camera.eye() + set.camera.forward() * 3.0;
+        let moved = [Aabb::new(here - 0.2, here + 0.2)];
+        renderer.draw_maps(&plan, Casters::MovedIn(&moved), None).unwrap();
+        let counts = renderer.page_counts().unwrap();
+        assert!((1..counts.wanted / 2).contains(&counts.drawn), "{name}: {counts:?}");
+        let again = Drawn::by(&mut renderer, &set.camera, &light);
+        assert_eq!(again.differ(&fresh), differ, "{name}");
+        renderer.draw_maps(&plan, Casters::Moved, None).unwrap();
+        let counts = renderer.page_counts().unwrap();
+        assert_eq!(counts.drawn, counts.wanted, "{name}");
+        let all = Drawn::by(&mut renderer, &set.camera, &light);
+        assert_eq!(all.differ(&fresh), 0, "{name}");
+    }
+}
+
+#[needs(gpu)]
+#[test]
+fn pages_without_what_they_need_are_refused() {
+    let scene = scene("pole");
+    let set = Set::new(&scene, IMAGE);
+    let technique: Technique = "paged".parse().unwrap();
+    let plan = set.plan(&[set.light()], &technique);
+    let bare = SceneBuffers::new(&GPU, &scene, false).unwrap();
+    let error = Renderer::new(&GPU, &bare, &options(&technique)).err().unwrap().to_string();
+    assert!(error.contains("options.pages"), "{error}");
+    let buffers = buffers(&scene);
+    let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
+    let error = renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap_err().to_string();
+    assert!(error.contains("options.pages"), "{error}");
+    let maps = set.plan(&[set.light()], &"lispsm@256".parse().unwrap());
+    let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+    let error = renderer.draw_maps(&maps, Casters::Unmoved, None).unwrap_err().to_string();
+    assert!(error.contains("frame.plan"), "{error}");
+    let support = Support { pages: false, ..GPU.support() };
+    let error = Renderer::with_support(&GPU, &buffers, &options(&technique), support);
+    assert!(error.err().unwrap().to_string().contains("uniform(stable)"));
 }

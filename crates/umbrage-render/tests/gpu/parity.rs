@@ -1,11 +1,11 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
 use crate::{GPU, Set, mesh_inputs, scene};
-use umbrage_clusters::build_finest;
 use glam::{DAffine3, DVec3, Quat, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
 use umbrage::visibility::{Blur, Filter, LightSize, Pattern, Prefilter, Width};
 use umbrage::{Camera, Light, LookAt, Plan, PointLight, Size, SpotLight, Technique};
+use umbrage_clusters::build_finest;
 use umbrage_render::{EdgeOn, Renderer, Sample, SceneBuffers, Shading};
 use umbrage_scene::{
     Alpha, Instance, Lens, Material, Mesh, Sampling, Scene, Texture, TextureId, Wrap,
@@ -564,7 +564,7 @@ fn every_width(scenes: &[&str]) {
 }
 
 /// A sun, a spot light at the viewer, a wide one there, and the scene's own bulb.
-fn four_lights(set: &Set<'_>) -> [Light; 4] {
+pub(crate) fn four_lights(set: &Set<'_>) -> [Light; 4] {
     let bulb = set.light();
     let spot = SpotLight {
         position: set.camera.eye() + DVec3::Y,
@@ -579,7 +579,12 @@ fn four_lights(set: &Set<'_>) -> [Light; 4] {
 }
 
 /// Checks each of several lights of one plan.
-fn agrees_with_lights(name: &str, set: &Set<'_>, lights: &[Light], technique: &Technique) {
+pub(crate) fn agrees_with_lights(
+    name: &str,
+    set: &Set<'_>,
+    lights: &[Light],
+    technique: &Technique,
+) {
     let plan = set.plan(lights, technique);
     let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
     for (index, light) in lights.iter().enumerate() {

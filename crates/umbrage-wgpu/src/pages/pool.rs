@@ -47,9 +47,11 @@ pub(crate) struct Pages {
     levels: Vec<Level>,
     /// The places that plans without a budget have, once they have needed more than expected.
     grown: Option<u32>,
+    /// The bind groups of `held`; `None` if a buffer was replaced.
+    groups: Option<Groups>,
     frame: u32,
     /// The workgroups that look at the viewer's depths.
-    groups: [u32; 2],
+    workgroups: [u32; 2],
     is_multisampled: bool,
     /// What the viewer's depths were bound with last.
     seen: Option<(TextureView, BindGroup)>,
@@ -102,18 +104,23 @@ struct Held {
     levels: Buffer,
     table: Buffer,
     stamps: Buffer,
+    placed: Buffer,
     wanted: Buffer,
     state: Buffer,
+    fresh: Buffer,
+    lists: Buffer,
     calls: Buffer,
     boxes: Buffer,
     shown: Buffer,
     room: u32,
-    allocate_group: BindGroup,
-    draw_group: BindGroup,
-    shown_group: Option<BindGroup>,
     pending: Pending,
-    /// Everything else that the bind groups hold.
-    _others: [Buffer; 3],
+}
+
+#[derive(Debug)]
+struct Groups {
+    allocate: BindGroup,
+    draw: BindGroup,
+    shown: Option<BindGroup>,
 }
 
 impl Pages {
@@ -144,8 +151,9 @@ impl Pages {
             held: None,
             levels: Vec::new(),
             grown: None,
+            groups: None,
             frame: 0,
-            groups: [1; 2],
+            workgroups: [1; 2],
             is_multisampled: false,
             seen: None,
             readbacks: [(); 3].map(|()| Readback::new(device, "shadow pages", bytes)),
@@ -192,9 +200,10 @@ impl Pages {
         device: &Device,
         geometry: &ClusterGeometry,
     ) -> Option<&BindGroup> {
-        let Held { shown, shown_group, .. } = self.held.as_mut()?;
+        let shown = &self.held.as_ref()?.shown;
         let layout = &geometry.pipelines.shown_layout;
-        Some(shown_group.get_or_insert_with(|| group(device, layout, &[shown])))
+        let kept = &mut self.groups.as_mut()?.shown;
+        Some(kept.get_or_insert_with(|| group(device, layout, &[shown])))
     }
 
     /// Encodes the passes that find the pages of a frame and give them places.
@@ -204,13 +213,17 @@ impl Pages {
         lookup_group: &BindGroup,
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) {
-        let (Some(held), Some((_, seen_group))) = (&self.held, &self.seen) else { return };
+        let (Some(held), Some(groups), Some((_, seen_group))) =
+            (&self.held, &self.groups, &self.seen)
+        else {
+            return;
+        };
         let pipelines = &self.pipelines;
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor {
             label: Some("shadow pages"),
             timestamp_writes: timestamps,
         });
-        pass.set_bind_group(0, &held.allocate_group, &[]);
+        pass.set_bind_group(0, &groups.allocate, &[]);
         pass.set_pipeline(&pipelines.begin);
         pass.dispatch_workgroups(1, 1, 1);
         for attempt in 0..ATTEMPTS {
@@ -218,13 +231,13 @@ impl Pages {
             pass.set_bind_group(0, seen_group, &[]);
             pass.set_bind_group(wgsl::PAGE_LOOKUP_GROUP, lookup_group, &[]);
             if attempt == 0 {
-                pass.dispatch_workgroups(self.groups[0], self.groups[1], 1);
+                pass.dispatch_workgroups(self.workgroups[0], self.workgroups[1], 1);
             } else {
                 // No workgroup, if the pages have their places.
                 pass.dispatch_workgroups_indirect(&held.calls, 0);
             }
             pass.set_pipeline(&pipelines.allocate);
-            pass.set_bind_group(0, &held.allocate_group, &[]);
+            pass.set_bind_group(0, &groups.allocate, &[]);
             pass.dispatch_workgroups(1, 1, 1);
         }
         drop(pass);
@@ -244,8 +257,8 @@ impl Pages {
     ) -> RenderPass<'e> {
         let load = if texture.is_fresh { LoadOp::Clear(1.0) } else { LoadOp::Load };
         let mut pass = depth_pass(encoder, &texture.layers[0], load, timestamps);
-        if let Some(held) = &self.held {
-            pass.set_bind_group(0, &held.draw_group, &[]);
+        if let (Some(held), Some(groups)) = (&self.held, &self.groups) {
+            pass.set_bind_group(0, &groups.draw, &[]);
             if !texture.is_fresh {
                 pass.set_pipeline(&self.pipelines.clear);
                 pass.draw_indirect(&held.calls, 16);
@@ -339,21 +352,20 @@ impl Shadows {
         };
         let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
         pages.levels = levels;
-        let has_room = pages
-            .held
-            .as_ref()
-            .is_some_and(|held| held.boxes.size() >= size_of_val(&*touched) as u64);
         let is_same = pages.key.as_ref().is_some_and(|key| {
             key.places == places
                 && key.grids == paging.grids
                 && key.sides.iter().eq(paging.levels.iter().map(|level| &level.side))
         });
-        if !(is_same && has_room && !rebind) {
+        if !is_same {
             let sides = paging.levels.iter().map(|level| level.side).collect();
             pages.key = Some(Key { grids: paging.grids.clone(), sides, places });
-            let room = Sizes { places, table: table_words, boxes: touched.len() };
-            pages.make(device, queue, room, buffers.maps());
+            pages.make(device, queue, places, table_words);
             rebind = true;
+        }
+        pages.hold_boxes(device, touched.len());
+        if rebind || pages.groups.is_none() {
+            pages.bind(device, buffers.maps());
         }
         if texture.size() != size || !is_same {
             if texture.size() != size {
@@ -373,7 +385,7 @@ impl Shadows {
         pages.frame = pages.frame.wrapping_add(1);
         let is_multisampled = depth.texture().sample_count() > 1;
         pages.is_multisampled = is_multisampled;
-        pages.groups = paging.camera.image().map(|n| n.div_ceil(8));
+        pages.workgroups = paging.camera.image().map(|n| n.div_ceil(8));
         let Pages { held: Some(held), uniforms, pipelines, seen, .. } = pages else { return };
         held.pending = Pending {
             number: 0,
@@ -391,7 +403,7 @@ impl Shadows {
             least_bias: paging.bias as f32,
             are_all_stale: (casters == Casters::Moved).into(),
             maps: plan.maps.len() as u32,
-            groups: pages.groups,
+            groups: pages.workgroups,
         };
         let view = data::View {
             base: projection.base as f32,
@@ -423,13 +435,6 @@ impl Shadows {
     }
 }
 
-/// The numbers of elements that a pool's buffers have room for.
-struct Sizes {
-    places: u32,
-    table: u32,
-    boxes: usize,
-}
-
 impl Pages {
     /// For each map and box the pages that the box's shadow may touch.
     fn touched(
@@ -444,68 +449,31 @@ impl Pages {
             .collect()
     }
 
-    /// Makes an empty pool.
-    fn make(&mut self, device: &Device, queue: &Queue, sizes: Sizes, maps: &Buffer) {
-        let Sizes { places, table, boxes } = sizes;
+    /// Makes an empty pool of so many places, with a table of so many words.
+    fn make(&mut self, device: &Device, queue: &Queue, places: u32, table_words: u32) {
         let room = 2 * places + 1024;
-        let stored = |elements: usize, size: usize, usage: BufferUsages| {
-            device.create_buffer(&BufferDescriptor {
-                label: Some("shadow pages"),
-                size: (elements * size).max(16) as u64,
-                usage: usage | BufferUsages::STORAGE | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
+        let words = |n: u32| 4 * n as usize;
         let none = BufferUsages::empty();
-        let count = |n: u32| n as usize;
-        let levels = stored(self.levels.len(), size_of::<Level>(), none);
-        let table_buffer = stored(count(table), 4, none);
-        let stamps = stored(count(table), 4, none);
-        let wanted = stored(count(room), 16, none);
-        let state = stored(STATE_WORDS, 4, BufferUsages::COPY_SRC);
-        let fresh = stored(count(places), size_of::<data::FreshPage>(), none);
-        let lists = stored(count(places + room), 4, none);
-        let calls = stored(8, 4, BufferUsages::INDIRECT);
-        let boxes = stored(boxes.next_power_of_two(), 16, none);
-        let shown = stored(4 * self.levels.len() + count(table), 4, none);
-        let empty = data::PlacedPage { map: data::EMPTY, ..bytemuck::Zeroable::zeroed() };
-        let all = vec![empty; count(places)];
-        let placed = buffer(device, &all, BufferUsages::STORAGE);
         // New buffers hold zeros: no entry, no stamp, no bias.
+        let calls = stored(device, words(8), BufferUsages::INDIRECT);
         queue.write_buffer(&calls, 0, bytemuck::cast_slice(&[0u32, 1, 1, 0, 6, 0, 0, 0]));
-        let allocate_group = group(
-            device,
-            &self.pipelines.allocate_layout,
-            &[
-                &self.uniforms.frame,
-                &table_buffer,
-                &levels,
-                &placed,
-                &wanted,
-                &state,
-                &fresh,
-                &lists,
-                &calls,
-                &boxes,
-                &shown,
-            ],
-        );
-        let draw_group =
-            group(device, &self.pipelines.draw_layout, &[&self.uniforms.pool, &fresh, maps]);
+        let empty = data::PlacedPage { map: data::EMPTY, ..bytemuck::Zeroable::zeroed() };
+        let places_of = |size: usize| places as usize * size;
         self.seen = None;
+        self.groups = None;
         self.held = Some(Held {
-            levels,
-            table: table_buffer,
-            stamps,
-            wanted,
-            state,
+            levels: stored(device, size_of_val(&*self.levels), none),
+            table: stored(device, words(table_words), none),
+            stamps: stored(device, words(table_words), none),
+            placed: buffer(device, &vec![empty; places as usize], BufferUsages::STORAGE),
+            wanted: stored(device, words(4 * room), none),
+            state: stored(device, 4 * STATE_WORDS, BufferUsages::COPY_SRC),
+            fresh: stored(device, places_of(size_of::<data::FreshPage>()), none),
+            lists: stored(device, words(places + room), none),
             calls,
-            boxes,
-            shown,
+            boxes: stored(device, 0, none),
+            shown: stored(device, words(4 * self.levels.len() as u32 + table_words), none),
             room,
-            allocate_group,
-            draw_group,
-            shown_group: None,
             pending: Pending {
                 number: 0,
                 room: places,
@@ -513,9 +481,52 @@ impl Pages {
                 error: 0.0,
                 has_budget: true,
             },
-            _others: [placed, fresh, lists],
         });
     }
+
+    /// Makes room for so many rectangles of pages.
+    fn hold_boxes(&mut self, device: &Device, count: usize) {
+        let Some(held) = &mut self.held else { return };
+        let bytes = count * size_of::<[i32; 4]>();
+        if held.boxes.size() < bytes as u64 {
+            held.boxes = stored(device, bytes.next_power_of_two(), BufferUsages::empty());
+            self.groups = None;
+        }
+    }
+
+    /// Binds all buffers, and that of the maps.
+    fn bind(&mut self, device: &Device, maps: &Buffer) {
+        let Some(held) = &self.held else { return };
+        let of_allocation = [
+            &self.uniforms.frame,
+            &held.table,
+            &held.levels,
+            &held.placed,
+            &held.wanted,
+            &held.state,
+            &held.fresh,
+            &held.lists,
+            &held.calls,
+            &held.boxes,
+            &held.shown,
+        ];
+        let of_draw = [&self.uniforms.pool, &held.fresh, maps];
+        self.groups = Some(Groups {
+            allocate: group(device, &self.pipelines.allocate_layout, &of_allocation),
+            draw: group(device, &self.pipelines.draw_layout, &of_draw),
+            shown: None,
+        });
+    }
+}
+
+/// A buffer of so many bytes for shaders.
+fn stored(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
+    device.create_buffer(&BufferDescriptor {
+        label: Some("shadow pages"),
+        size: bytes.max(16) as u64,
+        usage: usage | BufferUsages::STORAGE | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> BindGroup {

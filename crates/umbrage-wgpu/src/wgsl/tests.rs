@@ -232,7 +232,7 @@ fn structs_are_laid_out_alike() {
         m,
         "ShadowSettings",
         data::Settings,
-        [texture_scale, light_count, pixel_gradient, eye, fade]
+        [texture_scale, light_count, pages_across, pixel_gradient, eye, fade]
     );
     check_layout!(m, "ShadowLight", data::Light, [first_map, map_count, choice, axis, ends]);
     check_layout!(
