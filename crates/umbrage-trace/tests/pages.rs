@@ -117,7 +117,7 @@ fn shadows_of_pages_are_those_of_the_closed_form() {
                     let expected = f32::from(u8::from(!dark));
                     assert_eq!(lit, expected, "{filter}, {light:?}: {:?}", sample.surface.position);
                 }
-                assert!(counts[0] > 4000 && counts[1] > 300, "{filter}, {light:?}: {counts:?}");
+                assert!(counts[0] > 4000 && counts[1] > 100, "{filter}, {light:?}: {counts:?}");
             }
         }
     }
@@ -201,8 +201,6 @@ fn only_what_is_looked_up_is_traced() {
     let band = view.band(0..120, &nobody);
     let samples: Vec<&Sample> = band.samples().iter().flatten().collect();
     let plan = planned(&camera, light, "paged:pcf3");
-    // The windows have far more texels than any machine could hold.
-    assert!(plan.texels() > 1 << 28);
     assert_eq!(Reference::rows(&plan), 0);
     let reference = Reference::render(&tracer, &plan, &|_| panic!("no rows to report")).unwrap();
     assert_eq!((reference.pages(), reference.bytes()), (0, 0));
@@ -216,6 +214,8 @@ fn only_what_is_looked_up_is_traced() {
     let lit = all(&reference);
     assert_eq!(reference.pages(), wanted.len());
     assert_eq!(reference.bytes(), wanted.len() as u64 * 68 * 68 * 4);
+    // The windows have far more texels.
+    assert!(plan.texels() > 50 * 64 * 64 * wanted.len() as u64);
     // Once more, and by one thread.
     assert_eq!(all(&reference), lit);
     assert_eq!(reference.pages(), wanted.len());
