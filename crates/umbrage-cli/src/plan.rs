@@ -1,10 +1,13 @@
 //! `umbrage plan` prints the matrices, resolutions and errors that an engine needs.
 
+mod paged;
+
 use crate::args;
 use crate::output::{print, six_digits};
 use crate::progress::Bar;
 use crate::setup::{Chosen, choose, open_changed, tell_chosen, tell_notices};
 use anyhow::{Error, Result};
+use paged::Paged;
 use serde::Serialize;
 use std::fmt::Write;
 use umbrage::{
@@ -12,7 +15,7 @@ use umbrage::{
 };
 use umbrage_lab::{
     ChosenLight, ChosenView, Fit, MapCasters, NamedTechnique, Progress, Receivers, casters,
-    casters_culled, planner,
+    casters_culled, planner, seen_points,
 };
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
@@ -164,6 +167,25 @@ pub(crate) fn run(args: &args::Plan, quiet: bool) -> Result<()> {
     let plan = planner
         .plan(&view.camera, &lights, &bounds, technique.technique())
         .map_err(|e| technique.blame(e))?;
+    if plan.paging.is_some() {
+        let seen = scene.as_ref().map(|scene| {
+            let tracer = Tracer::new(scene)?.opaque(args.changes.opaque);
+            Ok::<_, Error>(seen_points(&tracer, &view.camera))
+        });
+        let seen = seen.transpose()?;
+        let mut plan = plan.clone();
+        plan.fit_pages(seen.as_deref().unwrap_or_default());
+        drop(bar);
+        if let Some(scene) = &scene {
+            tell_notices(scene);
+        }
+        tell_chosen(&view, &chosen);
+        let Some(paging) = &plan.paging else { return Ok(()) };
+        let (technique, chosen_lights) = (&args.shadows, &chosen[..]);
+        let seen = seen.as_deref();
+        let paged = Paged { technique, view: &view, chosen_lights, plan: &plan, paging, seen };
+        return paged.print(args.json, args.pages);
+    }
     drop(bar);
     if let Some(scene) = &scene {
         tell_notices(scene);
@@ -223,12 +245,6 @@ impl<'a> Planned<'a> {
             rect: self.rect(i),
             casters: self.casters.as_ref().map(|c| c[i]),
         });
-        let lights = plan.lights.iter().zip(self.chosen_lights).map(|(light, chosen)| LightJson {
-            name: chosen.name.clone(),
-            light: chosen.info(),
-            theta_deg: light.theta_rad.to_degrees(),
-            maps: [light.maps.start, light.maps.end],
-        });
         let atlas = self.atlas.as_ref();
         let layers = self.layers.as_ref();
         PlanJson {
@@ -236,7 +252,7 @@ impl<'a> Planned<'a> {
             storage_factor: plan.storage_factor(),
             texels: plan.texels(),
             theta_deg: plan.lights[0].theta_rad.to_degrees(),
-            lights: lights.collect(),
+            lights: lights(plan, self.chosen_lights),
             atlas: atlas.map(|a| AtlasJson { size: a.size, gutter: a.gutter_texels }),
             layers: layers.map(|l| LayersJson { size: l.size, count: l.layers }),
             casters_culled: self.culled,
@@ -261,8 +277,7 @@ impl<'a> Planned<'a> {
             Some(fit) => line(format_args!("fitted to       {}", fit.name())),
         }
         for (light, chosen) in plan.lights.iter().zip(self.chosen_lights) {
-            let name =
-                chosen.name.as_deref().filter(|_| self.chosen_lights.len() > 1).unwrap_or("light");
+            let name = name_among(chosen, self.chosen_lights);
             line(format_args!("view and {name:<6} {:.2}° apart", light.theta_rad.to_degrees()));
         }
         let limit = match self.technique.technique().size {
@@ -321,11 +336,7 @@ impl<'a> Planned<'a> {
                 line(format_args!("  casters         {drawn} triangles, {share} culled"));
             }
             line(format_args!("  shadow_from_world (rows)"));
-            let matrix = map.shadow_from_world();
-            for row in 0..4 {
-                let [a, b, c, d] = matrix.row(row).to_array();
-                line(format_args!("    {a:>16.9} {b:>16.9} {c:>16.9} {d:>16.9}"));
-            }
+            write_rows(map, &mut line);
         }
         text
     }
@@ -341,6 +352,30 @@ impl<'a> Planned<'a> {
             (slices > 1 && part.face != Some(Face::Near)).then(|| format!("slice {}", part.slice)),
         ];
         words.into_iter().flatten().fold(String::new(), |text, word| text + &word + ": ")
+    }
+}
+
+fn lights(plan: &Plan, chosen: &[ChosenLight]) -> Vec<LightJson> {
+    let lights = plan.lights.iter().zip(chosen).map(|(light, chosen)| LightJson {
+        name: chosen.name.clone(),
+        light: chosen.info(),
+        theta_deg: light.theta_rad.to_degrees(),
+        maps: [light.maps.start, light.maps.end],
+    });
+    lights.collect()
+}
+
+/// The name of a light, if there are several.
+fn name_among<'a>(light: &'a ChosenLight, all: &[ChosenLight]) -> &'a str {
+    light.name.as_deref().filter(|_| all.len() > 1).unwrap_or("light")
+}
+
+/// Writes the rows of a map's matrix.
+fn write_rows(map: &ShadowMap, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
+    let matrix = map.shadow_from_world();
+    for row in 0..4 {
+        let [a, b, c, d] = matrix.row(row).to_array();
+        line(format_args!("    {a:>16.9} {b:>16.9} {c:>16.9} {d:>16.9}"));
     }
 }
 

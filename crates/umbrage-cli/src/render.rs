@@ -1,7 +1,7 @@
 //! `umbrage render` renders one picture, or several of the same frame.
 
 use crate::args::{self, Aov, PictureArgs, PictureKind};
-use crate::output::note;
+use crate::output::{note, six_digits};
 use crate::progress::Bar;
 use crate::setup::{
     Chosen, announce, choose, open_changed, tell_chosen, tell_detail, tell_notices,
@@ -10,11 +10,12 @@ use anyhow::{Context, Result, ensure};
 use umbrage::{Plan, Size};
 use umbrage_lab::{
     Certainty, Detail, Executors, Motion, MovingView, NOTHING_TO_SHADOW, Progress, Receivers,
-    RenderScene, Rows, Shadowed, Shape, Texels, check_file, noise, plan, plan_fading,
+    RenderScene, Rows, SeenPage, Shadowed, Shape, Texels, check_file, fit_pages, noise, plan,
+    plan_fading,
 };
 use umbrage_measure::{
-    ErrorScale, Image, Rgb, cluster_map, difference_map, error_map, grey, noise_map, partition_map,
-    texel_map, with_legend, with_level_legend, write_exr, write_png,
+    ErrorScale, Image, Rgb, cluster_map, difference_map, error_map, grey, noise_map, page_map,
+    partition_map, texel_map, with_legend, with_level_legend, write_exr, write_png,
 };
 use umbrage_trace::{AreaLight, View, shade};
 
@@ -78,7 +79,8 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
         [PictureArgs { aov: Aov::Color, .. }] => plan_fading,
         _ => plan,
     };
-    let plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
+    let mut plan = plan(&args.shadows, &chosen.camera, &light, &bounds)?;
+    fit_pages(&mut plan, tracer);
     if needs.motion {
         Motion::Away.check(FRAMES, &chosen, light)?;
     }
@@ -106,6 +108,10 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
             rays as f64 / pixels as f64
         ));
     }
+    if let Some(paging) = plan.paging.as_ref().filter(|_| needs.maps) {
+        let limit = six_digits(paging.bound());
+        bar.note(&format!("texels: at most {limit} px wide across the light"));
+    }
     if needs.motion {
         let (scene, receivers, chosen_view) = (&render_scene, &receivers, &chosen);
         let moving = MovingView { scene, receivers, chosen_view, light, samples: 1 };
@@ -122,7 +128,7 @@ pub(crate) fn run(args: &args::Render, quiet: bool) -> Result<()> {
     }
     for picture in &pictures {
         match picture.kind {
-            PictureKind::Png => data.write_png(picture, &view)?,
+            PictureKind::Png => data.write_png(picture, &view, &plan)?,
             PictureKind::Exr => data.write_exr(picture, chosen.camera.image())?,
         }
         note(&format!("wrote: {}", picture.path.display()));
@@ -200,7 +206,7 @@ impl Data {
     }
 
     /// Writes a picture as a PNG, in colours.
-    fn write_png(&self, picture: &PictureArgs, view: &View<'_>) -> Result<()> {
+    fn write_png(&self, picture: &PictureArgs, view: &View<'_>, plan: &Plan) -> Result<()> {
         let path = &picture.path;
         let size = view.camera().image();
         let counted = Image::new(size, self.counted.clone())?;
@@ -233,9 +239,14 @@ impl Data {
                 &rgb(self.technique.color.clone())?,
             )?,
             Aov::Partition => partition_map(
-                &Image::new(size, self.texels.map.clone())?,
+                &Image::new(size, self.texels.tints(plan))?,
                 &rgb(self.technique.color.clone())?,
             )?,
+            Aov::Pages => {
+                let pages = self.texels.tints(plan).into_iter().zip(self.texels.pages());
+                let shown = pages.map(|(tint, page)| tint.zip(page));
+                page_map(&Image::new(size, shown.collect())?, &rgb(self.technique.color.clone())?)?
+            }
             Aov::Clusters => with_level_legend(cluster_map(
                 &Image::new(size, self.clusters.clone())?,
                 &rgb(self.technique.color.clone())?,
@@ -265,6 +276,14 @@ impl Data {
             Aov::Color => color(self.shape.radiance.clone()),
             Aov::Normal => color(self.shape.normal.iter().map(glam::Vec3::to_array).collect()),
             Aov::Texels => color(self.texels.texel.iter().map(|&[s, t]| [s, t, 0.0]).collect()),
+            Aov::Pages => {
+                let values = |page: &Option<SeenPage>| {
+                    page.map_or([-1.0; 3], |SeenPage { map, place: [i, j] }| {
+                        [f32::from(map), i as f32, j as f32]
+                    })
+                };
+                color(self.texels.pages().iter().map(values).collect())
+            }
             Aov::Clusters => {
                 let values = |seen: &Option<[u32; 2]>| {
                     seen.map_or([-1.0; 3], |[number, level]| [level as f32, number as f32, 0.0])

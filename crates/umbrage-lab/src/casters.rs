@@ -13,8 +13,12 @@ pub struct MapCasters {
     pub culled: u64,
 }
 
-/// Counts the triangles that may cast into each of the plan's maps, and those that cannot.
+/// Counts the triangles that may cast into each of the plan's maps, and those that cannot. Plans
+/// with pages have no maps that anything is drawn into, and so no counts.
 pub fn casters(plan: &Plan, scene: &Scene) -> Vec<MapCasters> {
+    if plan.paging.is_some() {
+        return Vec::new();
+    }
     let triangles = scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len() as u64);
     let boxes = scene.instance_boxes().into_iter().zip(triangles).enumerate();
     let casting = boxes.filter(|&(i, _)| scene.roles.of(i).casts);

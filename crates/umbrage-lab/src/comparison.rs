@@ -16,6 +16,7 @@ use crate::view::{ChosenView, ViewOptions, choose_view};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
+use umbrage::paged::{PAGE_TEXELS, Paging};
 use umbrage::visibility::LightSize;
 use umbrage::{Plan, ShadowMap};
 use umbrage_measure::{
@@ -122,7 +123,11 @@ impl<'a> Comparison<'a> {
         }
         let seen = prepared.render.seen(&prepared.receivers, &camera)?;
         let bounds = prepared.receivers.bounds(seen.as_ref());
-        let plan = |t| planning::timed_plan(t, &camera, &light, &bounds);
+        let plan = |t| {
+            let (mut plan, ms) = planning::timed_plan(t, &camera, &light, &bounds)?;
+            planning::fit_pages(&mut plan, prepared.render.tracer());
+            Ok((plan, ms))
+        };
         let plans = options.techniques.iter().map(plan).collect::<Result<Vec<_>, Error>>()?;
         Ok(Self { prepared, options, chosen_view, chosen_light, view, plans })
     }
@@ -352,12 +357,13 @@ impl Contender<'_> {
         let Yardstick { truth, kind, cosine } = yardstick;
         let size = truth.visibility.size();
         let picture = Picture::new(size, self.shadowed)?;
+        let tints = self.texels.tints(self.plan);
         let error_px = Image::new(size, self.texels.error)?;
         let perspective_px = Image::new(size, self.perspective)?;
         let texels = texel_map(&Image::new(size, self.texels.texel)?, &picture.color)?;
         // If a single map serves the whole picture, there is no partition to show.
         let partition = if self.plan.maps.iter().filter(|m| !ShadowMap::is_empty(m)).count() > 1 {
-            Some(partition_map(&Image::new(size, self.texels.map)?, &picture.color)?)
+            Some(partition_map(&Image::new(size, tints)?, &picture.color)?)
         } else {
             None
         };
@@ -371,19 +377,32 @@ impl Contender<'_> {
         };
         let pictures =
             write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
+        let paging = self.plan.paging.as_ref();
+        let pages = self.executor.pages().map(|pages| pages as u64);
+        let texels_of_page = u64::from(PAGE_TEXELS).pow(2);
+        let metrics = measure(truth.visibility, &picture.visibility, truth.counted, cosine)?;
+        let texels = match paging {
+            Some(_) => pages.unwrap_or_default() * texels_of_page,
+            None => self.plan.texels(),
+        };
         let measured = Measured {
             shadows,
             technique: Some(self.technique.technique().to_string()),
             backend: self.executor.name().into(),
             device: device.filter(|_| self.executor.is_gpu()),
-            maps: self.plan.maps.len() as u32,
-            texels: self.plan.texels(),
+            maps: paging.and(pages).unwrap_or(self.plan.maps.len() as u64) as u32,
+            texels,
             bytes: Some(self.executor.bytes()),
             truth: *kind,
-            metrics: measure(truth.visibility, &picture.visibility, truth.counted, cosine)?,
+            pages,
+            texels_per_pixel: pages
+                .filter(|_| metrics.counted > 0)
+                .map(|_| texels as f64 / metrics.counted as f64),
+            bound_px: paging.map(Paging::bound),
+            metrics,
             error_px: measure_error_px(&error_px, truth.counted)?,
             perspective_px: measure_error_px(&perspective_px, truth.counted)?,
-            storage_factor: Some(self.plan.storage_factor()),
+            storage_factor: paging.is_none().then(|| self.plan.storage_factor()),
             casters_culled: casters_culled(self.plan, &casters(self.plan, scene)),
             flicker: self.flicker,
             noise: self.noise,

@@ -2,7 +2,7 @@
 
 use crate::detail::Detail;
 use crate::error::{About, Error, Field};
-use crate::executors::{Executors, GPU, REFERENCE, runs_on_gpu};
+use crate::executors::{Executors, GPU, REFERENCE, unfit_for_gpu};
 use crate::receivers::Receivers;
 use crate::strip::{Rows, Strip};
 use glam::DVec3;
@@ -82,7 +82,7 @@ impl<'a> RenderScene<'a> {
 
     /// Returns the GPU and its buffers, if there is a GPU that can render the technique.
     fn gpu_for(&self, technique: &Technique) -> Option<&(&'a Gpu, SceneBuffers)> {
-        self.gpu.as_ref().filter(|_| runs_on_gpu(technique))
+        self.gpu.as_ref().filter(|_| unfit_for_gpu(technique).is_none())
     }
 
     /// Returns the executor that renders the technique. If `fades` is true, its plans' shadows may
@@ -247,6 +247,18 @@ impl<'a> Executor<'a> {
         match &self.work {
             Work::Gpu(on) => on.renderer.shadows().lookup_bytes(),
             Work::Reference { maps, .. } => maps.as_ref().map_or(0, |(_, r)| r.bytes()),
+        }
+    }
+
+    /// Returns the number of pages that the pictures since [`render`](Self::render) have looked up;
+    /// `None` if the plan has no pages.
+    pub fn pages(&self) -> Option<usize> {
+        match &self.work {
+            Work::Gpu(_) => None,
+            Work::Reference { maps, .. } => {
+                let (plan, reference) = maps.as_ref()?;
+                plan.paging.as_ref().map(|_| reference.pages())
+            }
         }
     }
 

@@ -33,36 +33,35 @@ impl Executors {
     /// An error if a GPU was asked for and there is none, or if it cannot render one of the
     /// techniques.
     pub fn open(backend: Backend, techniques: &[NamedTechnique]) -> Result<Self, Error> {
-        let log = techniques.iter().find(|t| !runs_on_gpu(t.technique()));
+        let unfit = techniques.iter().find_map(|t| Some((t, unfit_for_gpu(t.technique())?)));
         let wrong = |problem: String| Err(Error::field(Field::Backend, problem));
         match backend {
             Backend::Reference => {
                 Ok(Self { gpu: None, choice: "reference, on the CPU".to_owned() })
             }
             Backend::Gpu => {
-                if let Some(log) = log {
-                    return wrong(format!(
-                        "no GPU rasterises the rows of `{log}`; take reference or auto"
-                    ));
+                if let Some((technique, reason)) = unfit {
+                    return wrong(format!("`{technique}`: {reason}; take reference or auto"));
                 }
                 match Gpu::open() {
                     Ok(gpu) => Ok(Self { choice: described(&gpu), gpu: Some(gpu) }),
                     Err(e) => wrong(format!("{e}; take reference")),
                 }
             }
-            Backend::Auto if log.is_some() && techniques.len() == 1 => Ok(Self {
-                gpu: None,
-                choice: "reference, on the CPU (no GPU rasterises `log`)".to_owned(),
-            }),
-            Backend::Auto => Ok(match Gpu::open() {
-                Ok(gpu) => {
-                    let log = log.map_or(String::new(), |t| {
-                        format!("; reference for `{t}`, which no GPU rasterises")
-                    });
-                    let choice = described(&gpu) + &log;
-                    Self { gpu: Some(gpu), choice }
+            Backend::Auto => Ok(match unfit {
+                Some((_, reason)) if techniques.len() == 1 => {
+                    Self { gpu: None, choice: format!("reference, on the CPU ({reason})") }
                 }
-                Err(e) => Self { gpu: None, choice: format!("reference, on the CPU ({e})") },
+                _ => match Gpu::open() {
+                    Ok(gpu) => {
+                        let by_reference = unfit.map_or(String::new(), |(technique, reason)| {
+                            format!("; reference for `{technique}` ({reason})")
+                        });
+                        let choice = described(&gpu) + &by_reference;
+                        Self { gpu: Some(gpu), choice }
+                    }
+                    Err(e) => Self { gpu: None, choice: format!("reference, on the CPU ({e})") },
+                },
             }),
         }
     }
@@ -100,7 +99,13 @@ fn described(gpu: &Gpu) -> String {
     format!("gpu, {}{software}", gpu.info().name)
 }
 
-/// Returns whether a GPU can render the technique. None can with the `log` warp, whose rows bend.
-pub fn runs_on_gpu(technique: &Technique) -> bool {
-    technique.warp != Warp::Log
+/// Returns why no GPU can render the technique; `None` if one can.
+pub fn unfit_for_gpu(technique: &Technique) -> Option<&'static str> {
+    if technique.warp == Warp::Log {
+        Some("no GPU rasterises bent rows")
+    } else if technique.paged_error().is_some() {
+        Some("pages are not rendered on GPUs yet")
+    } else {
+        None
+    }
 }

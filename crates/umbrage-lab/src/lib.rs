@@ -81,12 +81,14 @@ pub use defaults::Defaults;
 pub use detail::{Detail, DetailOptions};
 pub use error::{Difference, Error, Field, joined};
 pub use executor::{Executor, RenderScene, Scout, edge_on, shadow_options};
-pub use executors::{Backend, Executors, runs_on_gpu};
+pub use executors::{Backend, Executors, unfit_for_gpu};
 pub use folder::{Contents, ReportFolder, check_file};
 pub use light::{ChosenLight, LightOptions, choose_light};
 pub use motion::{Motion, MovingView, Noise, flicker, noise};
-pub use picture::{Shadowed, Shape, Texels};
-pub use planning::{fade, milliseconds, plan, plan_fading, plan_with, planner};
+pub use picture::{SeenPage, Shadowed, Shape, Texels};
+pub use planning::{
+    fade, fit_pages, milliseconds, plan, plan_fading, plan_with, planner, seen_points,
+};
 pub use prepared::PreparedScene;
 pub use presets::{PRESETS, Preset};
 pub use progress::Progress;

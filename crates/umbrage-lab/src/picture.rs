@@ -2,6 +2,8 @@
 
 use crate::strip::Strip;
 use glam::Vec3;
+use umbrage::Plan;
+use umbrage::paged::PAGE_TEXELS;
 use umbrage_measure::Rgb;
 use umbrage_trace::shade;
 
@@ -38,7 +40,35 @@ pub struct Texels {
     pub map: Vec<Option<u16>>,
 }
 
+/// A page that serves a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeenPage {
+    /// Index in the plan of the map that is the window of the page's level.
+    pub map: u16,
+    /// The page's place in the window, pages.
+    pub place: [u32; 2],
+}
+
 impl Texels {
+    /// Returns the number of each pixel's tint: the index of the map that serves it or, in plans
+    /// with pages, that of its level, so that neighbouring levels have different tints.
+    pub fn tints(&self, plan: &Plan) -> Vec<Option<u16>> {
+        let is_paged = plan.paging.is_some();
+        let tint = |map: u16| match plan.maps.get(usize::from(map)) {
+            Some(window) if is_paged => window.part.slice as u16,
+            _ => map,
+        };
+        self.map.iter().map(|map| map.map(tint)).collect()
+    }
+
+    /// Returns the page that serves the middle of each pixel. The plan must have pages.
+    pub fn pages(&self) -> Vec<Option<SeenPage>> {
+        let page = |(map, texel): (&Option<u16>, &[f32; 2])| {
+            Some(SeenPage { map: (*map)?, place: texel.map(|t| t as u32 / PAGE_TEXELS) })
+        };
+        self.map.iter().zip(&self.texel).map(page).collect()
+    }
+
     /// Appends a strip.
     pub fn push(&mut self, strip: &Strip) {
         let means = strip.means(|i| strip.lookups[i].error);

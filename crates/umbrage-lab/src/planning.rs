@@ -2,8 +2,11 @@
 
 use crate::error::Error;
 use crate::technique::{MAX_SIDE, NamedTechnique};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use std::time::Instant;
 use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner};
+use umbrage_trace::{Ray, Tracer};
 
 /// The largest number of times that a plan is made to measure its time.
 const RUNS: usize = 7;
@@ -95,6 +98,29 @@ pub(crate) fn timed_plan(
     Ok((plan, ms))
 }
 
+/// Makes the pages of a plan as coarse as they must be to fit into their budget, for what the
+/// plan's camera sees at its pixels' centres. Does nothing for plans without such a budget.
+pub fn fit_pages(plan: &mut Plan, tracer: &Tracer<'_>) {
+    let Some(camera) = plan.paging.as_ref().filter(|p| p.budget.is_some()).map(|p| p.camera) else {
+        return;
+    };
+    let seen = seen_points(tracer, &camera);
+    plan.fit_pages(&seen);
+}
+
+/// Returns the world positions that a camera sees at its pixels' centres, up to its far distance.
+pub fn seen_points(tracer: &Tracer<'_>, camera: &Camera) -> Vec<DVec3> {
+    let [width, height] = camera.image();
+    let point = |x: u32, y: u32| {
+        let ray = Ray::of_view(camera, DVec2::new(f64::from(x), f64::from(y)) + 0.5);
+        // The ray's parameter t is the depth.
+        let hit = tracer.closest(ray, [camera.near(), camera.far()])?;
+        Some(tracer.position(&hit))
+    };
+    let rows = (0..height).into_par_iter();
+    rows.flat_map_iter(|y| (0..width).filter_map(move |x| point(x, y))).collect()
+}
+
 /// Runs a job that returns its time in milliseconds, again and again until enough is known.
 /// Returns the median time.
 fn median_time(mut job: impl FnMut() -> Result<f64, Error>) -> Result<f64, Error> {
@@ -116,7 +142,6 @@ mod tests {
     use super::*;
     use crate::defaults::Defaults;
     use crate::view::{ViewOptions, choose_view};
-    use glam::DVec3;
 
     /// The median time of a job with these times, and how often the job runs.
     fn median(times: &[f64]) -> (f64, usize) {

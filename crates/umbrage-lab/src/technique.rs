@@ -55,9 +55,10 @@ impl NamedTechnique {
     }
 
     /// Makes the planner take the fewest texels with which errors are at most this many pixels per
-    /// texel. Does nothing if the text gives a size.
+    /// texel. Does nothing if the text gives a size, or if the technique has pages, which have an
+    /// error of their own.
     pub fn limit_error(&mut self, pixels: f64) {
-        if !self.is_sized() {
+        if !self.is_sized() && self.technique.paged_error().is_none() {
             self.technique.size = Size::MaxError(pixels);
         }
     }
@@ -92,7 +93,7 @@ impl FromStr for NamedTechnique {
         let side = match technique.size {
             Size::Budget(texels) => texels.isqrt(),
             Size::Exact([width, height]) => width.max(height).into(),
-            Size::MaxError(_) => 0,
+            Size::MaxError(_) | Size::Needed => 0,
         };
         match side <= MAX_SIDE.into() {
             true => Ok(Self { text: text.to_owned(), technique }),

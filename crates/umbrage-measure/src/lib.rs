@@ -37,7 +37,9 @@ pub use error::Error;
 pub use files::{ExrPixel, PngPixel, png, write_exr, write_file, write_file_with, write_png};
 pub use image::{Image, Rgb};
 pub use legend::{with_legend, with_level_legend};
-pub use maps::{cluster_map, difference_map, error_map, grey, noise_map, partition_map, texel_map};
+pub use maps::{
+    cluster_map, difference_map, error_map, grey, noise_map, page_map, partition_map, texel_map,
+};
 pub use metrics::{ErrorPx, Metrics, Spots, Tally, measure, measure_error_px};
 pub use page::{
     FigureFile, FigureShown, FiguresPage, Page, SweepPage, comma_separated, quoted, quoted_option,

@@ -89,6 +89,32 @@ pub fn partition_map(
     })
 }
 
+/// The page that serves each pixel: the dimmed `picture`, tinted by the colour in [`PARTITIONS`] of
+/// the page's level, with dark borders of pages. A pixel has the number of its level and something
+/// that tells its page from others; pixels with `None`, which no page serves, are only dimmed.
+///
+/// # Errors
+/// The sizes differ.
+pub fn page_map<P: PartialEq>(
+    pages: &Image<Option<(u16, P)>>,
+    picture: &Image<Rgb>,
+) -> Result<Image<Rgb>, Error> {
+    picture.check_like(pages, "picture")?;
+    let [width, height] = pages.size();
+    Image::from_fn(pages.size(), |x, y| {
+        let page = pages.at(x, y);
+        let color = page.as_ref().map(|(i, _)| PARTITIONS[usize::from(*i) % PARTITIONS.len()]);
+        let tint = tinted(*picture.at(x, y), color);
+        // Where the sky begins is no border of a page.
+        let differs = |x: u32, y: u32| {
+            let other = (x < width && y < height).then(|| pages.at(x, y));
+            other.is_some_and(|other| other.is_some() && other != page)
+        };
+        let is_border = page.is_some() && (differs(x + 1, y) || differs(x, y + 1));
+        if is_border { mix(tint, [0; 3], 0.75) } else { tint }
+    })
+}
+
 /// The cluster of triangles that each pixel shows, by its number and its level of detail: the
 /// `picture`, tinted by [`cluster_color`]. Pixels with `None`, which show the sky, are only dimmed.
 ///
@@ -212,6 +238,15 @@ mod tests {
         let index = image([3, 1], &[Some(0), Some(PARTITIONS.len() as u16), None]);
         let map = partition_map(&index, &image([3, 1], &[[255; 3]; 3])).unwrap();
         assert_eq!(map.pixels(), [PARTITIONS[0], PARTITIONS[0], [65; 3]]);
+    }
+
+    #[test]
+    fn pages_have_borders_and_the_colours_of_their_levels() {
+        let pages = [Some((0, 'a')), Some((0, 'a')), Some((0, 'b')), Some((1, 'b')), None];
+        let map = page_map(&image([5, 1], &pages), &image([5, 1], &[[255; 3]; 5])).unwrap();
+        let dark = |color: Rgb| mix(color, [0; 3], 0.75);
+        let [first, second] = [PARTITIONS[0], PARTITIONS[1]];
+        assert_eq!(map.pixels(), [first, dark(first), dark(first), second, [65; 3]]);
     }
 
     #[test]

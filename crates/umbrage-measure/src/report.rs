@@ -153,10 +153,21 @@ pub struct Measured {
     /// Name of the GPU.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// Number of shadow maps.
+    /// Number of shadow maps, or of pages.
     pub maps: u32,
-    /// Number of texels of all maps together.
+    /// Number of texels of all maps or pages together.
     pub texels: u64,
+    /// Number of pages in use; `None` for techniques without pages.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pages: Option<u64>,
+    /// Texels of the pages in use over the pixels counted; `None` for techniques without pages, or
+    /// if no pixel was counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texels_per_pixel: Option<f64>,
+    /// The greatest width of a texel across the light that the pages allowed, pixels: what was asked
+    /// for, or more if that many pages did not fit. `None` for techniques without pages.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound_px: Option<f64>,
     /// Memory that lookups read, bytes: depths or, with a prefilter, the statistics in prefiltered
     /// maps; gutters and mip levels included.
     #[serde(default)]
@@ -172,7 +183,8 @@ pub struct Measured {
     /// Pixels per texel at the visible surfaces, without their slope towards the light.
     #[serde(default)]
     pub perspective_px: ErrorPx,
-    /// Texels needed per pixel of the picture for an error of 1 (Lloyd et al. 2006, Eq. 12).
+    /// Texels needed per pixel of the picture for an error of 1 (Lloyd et al. 2006, Eq. 12). `None`
+    /// for pages.
     pub storage_factor: Option<f64>,
     /// Share of the triangles that need not be drawn into a map, as the mean over the maps that
     /// serve any receivers.
@@ -246,6 +258,9 @@ pub(crate) mod tests {
             device: None,
             maps: 1,
             texels: 1 << 40,
+            pages: None,
+            texels_per_pixel: None,
+            bound_px: None,
             bytes: Some(1 << 42),
             metrics: Metrics {
                 counted: if wrong.is_some() { 1000 } else { 0 },

@@ -237,7 +237,7 @@ impl Sweep {
 
 /// The columns of `results.csv` that follow the columns of the view.
 type CsvColumn = (&'static str, fn(&Measured) -> String);
-const CSV: [CsvColumn; 24] = [
+const CSV: [CsvColumn; 27] = [
     ("shadows", |r| r.shadows.clone()),
     ("backend", |r| r.backend.clone()),
     ("maps", |r| r.maps.to_string()),
@@ -260,6 +260,9 @@ const CSV: [CsvColumn; 24] = [
     ("storage_factor", |r| number(r.storage_factor)),
     ("casters_culled", |r| number(r.casters_culled)),
     ("bytes", |r| r.bytes.map(|b| b.to_string()).unwrap_or_default()),
+    ("pages", |r| r.pages.map(|n| n.to_string()).unwrap_or_default()),
+    ("texels_per_pixel", |r| number(r.texels_per_pixel)),
+    ("bound_px", |r| number(r.bound_px)),
     ("truth", |r| r.truth.map_or("", TruthKind::name).to_owned()),
     ("error", |_| String::new()),
 ];
@@ -308,6 +311,12 @@ struct ResultJson<'a> {
     device: Option<&'a str>,
     maps: u32,
     texels: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pages: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    texels_per_pixel: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bound_px: Option<f64>,
     bytes: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     truth: Option<TruthKind>,
@@ -330,6 +339,9 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             device,
             maps,
             texels,
+            pages,
+            texels_per_pixel,
+            bound_px,
             bytes,
             truth,
             metrics,
@@ -348,6 +360,9 @@ impl<'a> From<&'a Measured> for ResultJson<'a> {
             device: device.as_deref(),
             maps: *maps,
             texels: *texels,
+            pages: *pages,
+            texels_per_pixel: *texels_per_pixel,
+            bound_px: *bound_px,
             bytes: *bytes,
             truth: *truth,
             metrics,

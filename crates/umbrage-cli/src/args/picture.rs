@@ -72,6 +72,9 @@ pub(crate) enum Aov {
     Texels,
     /// Which map of the plan serves each pixel. EXR: its index, −1 for none.
     Partition,
+    /// The pages of a paged map, tinted by their level, with dark borders. EXR: the index of the
+    /// level's window in the plan, and the page's place in the window; −1 for none.
+    Pages,
     /// How much pixels sparkle while the viewer moves away (8 frames of `compare --motion away`),
     /// against supersampled truth. EXR: the mean change of a pixel's error from frame to frame, NaN
     /// where pixels show more than one surface.
@@ -97,6 +100,11 @@ impl Render {
         ensure!(
             self.light_size.is_none() || self.aov.iter().any(|aov| aov.shows_truth()),
             "--light-size: only --aov truth and --aov difference show the truth"
+        );
+        ensure!(
+            !self.aov.contains(&Aov::Pages) || self.shadows.technique().paged_error().is_some(),
+            "--aov: `{}` has no pages to show; take --shadows paged",
+            self.shadows
         );
         if self.shows_clusters() {
             ensure!(

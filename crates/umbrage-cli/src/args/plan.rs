@@ -33,6 +33,9 @@ pub(crate) struct Plan {
     /// by default; an engine may know no more than a box.
     #[arg(long, value_enum, default_value_t = Fit::Box)]
     pub(crate) fit: Fit,
+    /// List the pages that the view needs, with their matrices.
+    #[arg(long)]
+    pub(crate) pages: bool,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -66,6 +69,11 @@ impl Plan {
         self.texels.apply(std::slice::from_mut(&mut self.shadows))?;
         self.view.options().check()?;
         self.lights.check()?;
+        ensure!(
+            !self.pages || self.shadows.technique().paged_error().is_some(),
+            "--pages: `{}` has no pages; take --shadows paged",
+            self.shadows
+        );
         if self.scene.is_some() || self.session.is_some() {
             return Ok(());
         }
@@ -94,6 +102,7 @@ impl Plan {
         for (option, is_given) in changes {
             ensure!(!is_given, "{option} changes a scene, but no SCENE is given");
         }
+        ensure!(!self.pages, "--pages: what is seen of a SCENE decides which there are; give one");
         ensure!(self.fit == Fit::Box, "--fit: `surfaces` and `seen` need a SCENE, which has them");
         Ok(())
     }

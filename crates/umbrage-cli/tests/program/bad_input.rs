@@ -147,11 +147,11 @@ fn options_of_some_commands() {
         (&["render", "pole", "-o", "p.png", "--aov", "colour"], "color"),
         (
             &["render", "pole", "-o", "p.png", "--backend", "gpu", "--shadows", "log@64"],
-            "--backend: no GPU rasterises the rows of `log@64`; take reference or auto",
+            "--backend: `log@64`: no GPU rasterises bent rows; take reference or auto",
         ),
         (
             &["compare", "pole", "-o", "r", "--backend", "gpu", "--shadows", "log"],
-            "--backend: no GPU rasterises the rows of `log`",
+            "--backend: `log`: no GPU rasterises bent rows",
         ),
         (&["bench", "pole", "--frames", "5"], "20..=10000"),
         (&["bench", "pole", "--shadows", "psm", "--shadows", "psm"], "`psm` is given twice"),

@@ -11,6 +11,7 @@ mod goldens;
 mod help;
 mod motion;
 mod none;
+mod paged;
 mod partitions;
 mod plan;
 mod render;

@@ -153,7 +153,7 @@ fn what_renders_is_told() {
     };
     assert!(run(&["--backend", "auto"]).starts_with("backend: gpu, "));
     let log = run(&["--shadows", "log"]);
-    assert_eq!(log, "backend: reference, on the CPU (no GPU rasterises `log`)");
+    assert_eq!(log, "backend: reference, on the CPU (no GPU rasterises bent rows)");
     assert!(run(&["--backend", "gpu"]).starts_with("backend: gpu, "));
     assert_eq!(run(&["--backend", "reference"]), "backend: reference, on the CPU");
 }

@@ -502,7 +502,7 @@ fn options_and_places_that_do_not_fit() {
         (&["--shadows", "lispsm@64"], "`lispsm@64` is given twice"),
         (
             &["--backend", "gpu", "--shadows", "log"],
-            "--backend: no GPU rasterises the rows of `log`",
+            "--backend: `log`: no GPU rasterises bent rows",
         ),
     ] {
         refuses(&desk, &small("out", options), expected);

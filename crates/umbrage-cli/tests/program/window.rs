@@ -23,11 +23,12 @@ fn a_window_shows_a_scene() {
     assert_eq!(shot.is_fine().size(), [640, 480]);
 }
 
-/// Each word and option of the language draws nearly the same picture; `log` tells why it cannot.
+/// Each word and option of the language draws nearly the same picture; `log` and
+/// `paged` tell why they cannot.
 #[needs(gpu, window)]
 #[test]
 fn every_word_of_the_language_is_shown() {
-    let mut script = format!("{SMALL}technique uniform:hard@256\nwait ready\nshoot first\n");
+    let mut script = format!("{SMALL}technique uniform:hard@512\nwait ready\nshoot first\n");
     let techniques = techniques();
     for (i, technique) in techniques.iter().enumerate() {
         let _ = writeln!(script, "technique {technique}\nwait ready\nshoot t{i}");
@@ -39,7 +40,7 @@ fn every_word_of_the_language_is_shown() {
         println!("t{i}: {technique}");
         shot.is_fine();
         // Without shadows, with a message, and half as bright.
-        if ["none", "log", "raw"].iter().any(|word| technique.contains(word)) {
+        if ["none", "log", "paged", "raw"].iter().any(|word| technique.contains(word)) {
             shot.is_unlike(&first, 1.0);
         } else {
             shot.is_like(&first, 3.0);
@@ -65,9 +66,9 @@ fn techniques() -> Vec<String> {
             .collect()
     };
     let all = [
-        all(WARPS, "", "@256"),
-        all(PARTITIONS, "adaptive+", "@256"),
-        all(FILTERS, "uniform:", "@256"),
+        all(WARPS, "", "@512"),
+        all(PARTITIONS, "adaptive+", "@512"),
+        all(FILTERS, "uniform:", "@512"),
     ];
     all.concat()
 }

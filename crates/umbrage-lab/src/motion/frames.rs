@@ -118,7 +118,11 @@ impl<'a> Frame<'a> {
             let view = View::new(scene.tracer(), camera, light, samples).about(Field::Samples)?;
             let seen = scene.seen(receivers, &camera)?;
             let bounds = receivers.bounds(before.as_ref().or(seen.as_ref()));
-            let plan = |t| planning::plan(t, &camera, &light, &bounds);
+            let plan = |t| {
+                let mut plan = planning::plan(t, &camera, &light, &bounds)?;
+                planning::fit_pages(&mut plan, scene.tracer());
+                Ok(plan)
+            };
             let plans = techniques.iter().map(plan).collect::<Result<_, Error>>()?;
             before = seen;
             Ok(Self { view, plans })

@@ -117,10 +117,24 @@ pub(super) fn columns(results: &[&Measured]) -> Vec<Column> {
             "Mean change of a pixel's error between frames, against supersampled truth",
             |r| r.noise,
         )),
-        whole(column("Maps", "", "Number of shadow maps", |r| Some(f64::from(r.maps)))),
-        unjudged(column("Texels", "million", "Texels of all maps together", |r| {
+        whole(column("Maps", "", "Number of shadow maps, or of pages in use", |r| {
+            Some(f64::from(r.maps))
+        })),
+        unjudged(column("Texels", "million", "Texels of all maps or pages together", |r| {
             Some(r.texels as f64 / 1e6)
         })),
+        rare(unjudged(column(
+            "Texels used",
+            "texels/px",
+            "Texels of the pages in use over the pixels counted",
+            |r| r.texels_per_pixel,
+        ))),
+        rare(column(
+            "Bound",
+            "px/texel",
+            "The greatest width of a texel across the light that the pages allowed",
+            |r| r.bound_px,
+        )),
         rare(unjudged(column("Memory", "MiB", "Memory that lookups read", |r| {
             r.bytes.map(|b| b as f64 / (1024.0 * 1024.0))
         }))),

@@ -141,23 +141,31 @@ impl Draft {
     fn slot(&mut self, ui: &mut Ui, slot: Slot, name: &str) {
         let text = self.valid.clone();
         let current = written(&text, slot);
-        let shown = current.as_ref().map_or("one map".to_owned(), |w| w.word.to_string());
+        let (nothing, no_meaning, no_tip) = match slot {
+            Slot::Size => ("as needed", "As many pages as the view needs.", "No limit."),
+            _ => ("one map", "No maps for parts of the view.", "No such parts."),
+        };
+        let shown = current.as_ref().map_or(nothing.to_owned(), |w| w.word.to_string());
         ui.horizontal(|ui| {
             ui.label(name);
-            let meaning =
-                current.as_ref().map_or("No maps for parts of the view.", |w| w.word.meaning);
+            let meaning = current.as_ref().map_or(no_meaning, |w| w.word.meaning);
             ComboBox::from_id_salt(name)
                 .selected_text(RichText::new(shown).monospace())
                 .width(120.0)
                 .show_ui(ui, |ui| {
-                    let is_partition = matches!(slot, Slot::Slices | Slot::Faces);
-                    if is_partition
-                        && ui
-                            .selectable_label(current.is_none(), "one map")
-                            .tip("No such parts.")
-                            .clicked()
+                    let without = with_word(&text, slot, None);
+                    let may_be_left_out = match slot {
+                        Slot::Slices | Slot::Faces => true,
+                        // Other maps than pages then have the size that need not be written.
+                        Slot::Size => {
+                            without.as_ref().is_ok_and(|text| written(text, slot).is_none())
+                        }
+                        Slot::Warp | Slot::Filter => false,
+                    };
+                    if may_be_left_out
+                        && ui.selectable_label(current.is_none(), nothing).tip(no_tip).clicked()
                     {
-                        self.try_change(with_word(&text, slot, None));
+                        self.try_change(without);
                     }
                     for word in slot.words() {
                         let is_current = current.as_ref().is_some_and(|w| w.word.name == word.name);

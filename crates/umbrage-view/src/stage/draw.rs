@@ -13,7 +13,7 @@ use umbrage::visibility::Filter;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles};
 use umbrage_lab::{
     Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, milliseconds,
-    plan_with, planner, runs_on_gpu, shadow_options,
+    plan_with, planner, shadow_options, unfit_for_gpu,
 };
 use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
 use umbrage_trace::Tracer;
@@ -237,8 +237,8 @@ impl<'a> Artist<'a> {
         light: &Light,
         seen: Option<&SeenTiles>,
     ) -> Result<DrawnPicture, String> {
-        if !runs_on_gpu(technique.technique()) {
-            return Err("no GPU rasterises bent rows; `umbrage render` traces them".into());
+        if let Some(reason) = unfit_for_gpu(technique.technique()) {
+            return Err(format!("{reason}; `umbrage render` traces them"));
         }
         let (gpu, buffers, tracer) = (self.gpu, self.buffers, self.tracer());
         let posed = self.posed.as_ref().filter(|posed| !posed.is_at_rest());

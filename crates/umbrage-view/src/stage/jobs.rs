@@ -14,7 +14,7 @@ use umbrage::visibility::{Filter, LightSize};
 use umbrage::{Camera, Light, Plan};
 use umbrage_lab::{
     Bencher, NamedTechnique, PreparedScene, Rows, edge_on, milliseconds, plan, plan_fading,
-    shadow_options,
+    shadow_options, unfit_for_gpu,
 };
 use umbrage_measure::Image;
 use umbrage_render::{FrameTarget, Gpu, Renderer, Shading};
@@ -200,6 +200,9 @@ impl Worker<'_, '_> {
         folder: &Path,
     ) -> Result<String, String> {
         let text = |e: umbrage_render::Error| e.to_string();
+        if let Some(reason) = unfit_for_gpu(technique.technique()) {
+            return Err(reason.into());
+        }
         let (gpu, buffers) = self.prepared.render().on_gpu().ok_or("there is no GPU")?;
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let options = shadow_options(technique.technique(), true);
