@@ -4,13 +4,13 @@ use crate::args::bench;
 use crate::output::{aligned, print};
 use crate::progress::Bar;
 use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_detail, tell_notices};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
 use umbrage::{Bounds, Plan, Planner};
 use umbrage_lab::{
     Bencher, Costs, Detail, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
-    milliseconds, plan, plan_with, planner, unfit_for_gpu,
+    milliseconds, plan, plan_with, planner,
 };
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::Scene;
@@ -132,12 +132,6 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
     let chosen_light = &lights[0];
     bar.stage("preparing the scene");
     let techniques = &args.techniques.shadows;
-    let unfit = techniques.iter().filter(|t| t.technique().paged_error().is_some());
-    for technique in unfit {
-        if let Some(reason) = unfit_for_gpu(technique.technique()) {
-            bail!("--shadows: `{technique}`: {reason}, and the time of rays is no renderer's cost");
-        }
-    }
     let executors = Executors::open(args.techniques.execution.backend.into(), techniques)?;
     let detail = Detail::new(&scene, &executors, &args.techniques.execution.detail(), &bar)?;
     let render_scene = RenderScene::new(&scene, &executors, args.scene.changes.opaque, &detail)?;

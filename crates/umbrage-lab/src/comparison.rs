@@ -16,7 +16,7 @@ use crate::view::{ChosenView, ViewOptions, choose_view};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-use umbrage::paged::{PAGE_TEXELS, Paging};
+use umbrage::paged::PAGE_TEXELS;
 use umbrage::visibility::LightSize;
 use umbrage::{Plan, ShadowMap};
 use umbrage_measure::{
@@ -347,7 +347,7 @@ fn trace(
 impl Contender<'_> {
     /// Measures the technique and writes its pictures into `folder`.
     fn finish(
-        self,
+        mut self,
         index: usize,
         folder: &Path,
         yardstick: &Yardstick<'_>,
@@ -398,7 +398,7 @@ impl Contender<'_> {
             texels_per_pixel: pages
                 .filter(|_| metrics.counted > 0)
                 .map(|_| texels as f64 / metrics.counted as f64),
-            bound_px: paging.map(Paging::bound),
+            bound_px: self.executor.bound_px(),
             metrics,
             error_px: measure_error_px(&error_px, truth.counted)?,
             perspective_px: measure_error_px(&perspective_px, truth.counted)?,

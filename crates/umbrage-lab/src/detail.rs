@@ -117,7 +117,7 @@ impl Detail {
 }
 
 /// The meshes of a scene, as clusters are made of them.
-fn inputs<'a>(scene: &'a Scene) -> Vec<MeshInput<'a>> {
+pub(crate) fn inputs<'a>(scene: &'a Scene) -> Vec<MeshInput<'a>> {
     let input = |mesh: &'a Mesh| MeshInput {
         positions: &mesh.positions,
         normals: &mesh.normals,

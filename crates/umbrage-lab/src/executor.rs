@@ -1,13 +1,15 @@
 //! Executors, which render shadow maps and look them up: a GPU, or the reference on the CPU.
 
-use crate::detail::Detail;
+use crate::detail::{Detail, inputs};
 use crate::error::{About, Error, Field};
 use crate::executors::{Executors, GPU, REFERENCE, unfit_for_gpu};
 use crate::receivers::Receivers;
 use crate::strip::{Rows, Strip};
 use glam::DVec3;
 use rayon::prelude::*;
+use umbrage::paged::Paging;
 use umbrage::{Camera, Light, Plan, SeenTiles, Technique};
+use umbrage_clusters::build_finest;
 use umbrage_render::{
     EdgeOn, FrameTarget, Gpu, Renderer, SceneBuffers, SeenCluster, Shading, Timer,
 };
@@ -94,6 +96,7 @@ impl<'a> RenderScene<'a> {
         let work = match self.gpu_for(technique) {
             Some((gpu, buffers)) => {
                 let options = shadow_options(technique, fades);
+                make_pages(gpu, buffers, self.tracer.scene(), technique).on_gpu()?;
                 let renderer = Renderer::new(gpu, buffers, &options).on_gpu()?;
                 let is_prefiltered = technique.filter.prefilter().is_some();
                 let timer = is_prefiltered.then(|| Timer::new(gpu)).flatten();
@@ -113,8 +116,26 @@ pub fn shadow_options(technique: &Technique, fades: bool) -> ShadowOptions {
         filter: technique.filter,
         buffers: LookupBuffers::for_technique(technique, 1),
         fades,
+        pages: technique.paged_error().is_some(),
         ..ShadowOptions::default()
     }
+}
+
+/// Makes what a technique's pages are drawn from, unless it has none or the scene has that already.
+///
+/// # Errors
+/// An error if the device has no room for it.
+pub fn make_pages(
+    gpu: &Gpu,
+    buffers: &SceneBuffers,
+    scene: &Scene,
+    technique: &Technique,
+) -> Result<(), umbrage_render::Error> {
+    if technique.paged_error().is_none() {
+        return Ok(());
+    }
+    let finest = || build_finest(&inputs(scene));
+    buffers.make_pages(gpu, scene, finest)
 }
 
 /// Finds on a GPU what cameras see, for maps that are fitted to that.
@@ -250,15 +271,25 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// Returns the number of pages that the pictures since [`render`](Self::render) have looked up;
-    /// `None` if the plan has no pages.
-    pub fn pages(&self) -> Option<usize> {
-        match &self.work {
-            Work::Gpu(_) => None,
+    /// Returns the number of pages that the pictures since [`render`](Self::render) have looked up
+    /// or, on a GPU, of those in use, with the ones that stand in for others; `None` if the plan has
+    /// no pages.
+    pub fn pages(&mut self) -> Option<usize> {
+        match &mut self.work {
+            Work::Gpu(on) => on.renderer.page_counts().map(|counts| counts.wanted as usize),
             Work::Reference { maps, .. } => {
                 let (plan, reference) = maps.as_ref()?;
                 plan.paging.as_ref().map(|_| reference.pages())
             }
+        }
+    }
+
+    /// Returns the greatest width of a texel that a receiver has, pixels; `None` if the plan has no
+    /// pages, or before its maps are rendered.
+    pub fn bound_px(&mut self) -> Option<f64> {
+        match &mut self.work {
+            Work::Gpu(on) => on.renderer.page_counts().map(|counts| counts.bound.into()),
+            Work::Reference { maps, .. } => maps.as_ref()?.0.paging.as_ref().map(Paging::bound),
         }
     }
 

@@ -101,11 +101,5 @@ fn described(gpu: &Gpu) -> String {
 
 /// Returns why no GPU can render the technique; `None` if one can.
 pub fn unfit_for_gpu(technique: &Technique) -> Option<&'static str> {
-    if technique.warp == Warp::Log {
-        Some("no GPU rasterises bent rows")
-    } else if technique.paged_error().is_some() {
-        Some("pages are not rendered on GPUs yet")
-    } else {
-        None
-    }
+    (technique.warp == Warp::Log).then_some("no GPU rasterises bent rows")
 }

@@ -80,7 +80,7 @@ pub use comparison::{Compared, Comparison, ComparisonOptions};
 pub use defaults::Defaults;
 pub use detail::{Detail, DetailOptions};
 pub use error::{Difference, Error, Field, joined};
-pub use executor::{Executor, RenderScene, Scout, edge_on, shadow_options};
+pub use executor::{Executor, RenderScene, Scout, edge_on, make_pages, shadow_options};
 pub use executors::{Backend, Executors, unfit_for_gpu};
 pub use folder::{Contents, ReportFolder, check_file};
 pub use light::{ChosenLight, LightOptions, choose_light};

@@ -37,12 +37,22 @@ pub struct SceneBuffers {
     placed: RwLock<Placed>,
 }
 
+/// The error of pages whose casters change their shape.
+fn deformed_error() -> Error {
+    Error::Invalid {
+        field: "meshes",
+        problem: "must keep their shape where pages are drawn, but some are deformed".into(),
+    }
+}
+
 /// Where the instances of a scene are.
 pub(crate) struct Placed {
     /// The instances that have triangles, those of one mesh next to each other.
     pub(crate) instances: Vec<Drawable>,
     /// How often instances changed.
     pub(crate) version: u64,
+    /// Whether a pose has deformed a mesh.
+    is_deformed: bool,
     /// For each of the scene's instances, its index in `instances`, if it has triangles.
     drawable_of: Vec<Option<u32>>,
     /// A box around each mesh, in its own space, metres.
@@ -233,12 +243,19 @@ impl SceneBuffers {
         &self,
         gpu: &Gpu,
         scene: &Scene,
-        finest: impl FnOnce() -> Vec<ClusterMesh>,
+        finest: impl FnOnce() -> Result<Vec<ClusterMesh>, umbrage_clusters::Error>,
     ) -> Result<(), Error> {
         if self.clusters.is_some() || self.finest.get().is_some() {
             return Ok(());
         }
-        let clusters = SceneClusters::new(gpu, scene, self, &finest())?;
+        if self.placed().is_deformed {
+            return Err(deformed_error());
+        }
+        let finest = finest().map_err(|e| Error::Invalid {
+            field: "scene",
+            problem: format!("has no clusters to draw pages from: {e}"),
+        })?;
+        let clusters = SceneClusters::new(gpu, scene, self, &finest)?;
         let clusters = clusters.ok_or_else(|| Error::TooLarge {
             what: "the scene".into(),
             problem: "clusters of its triangles, from which pages are drawn, need more memory"
@@ -290,12 +307,9 @@ impl SceneBuffers {
         let deformed: Option<Vec<_>> = moved.meshes.iter().map(of_mesh).collect();
         let Some(deformed) = deformed.filter(|_| is_same) else { return Err(Error::OtherScene) };
         if self.finest.get().is_some() && !deformed.is_empty() {
-            return Err(Error::Invalid {
-                field: "meshes",
-                problem: "must keep their shape where pages are drawn, but some are deformed"
-                    .into(),
-            });
+            return Err(deformed_error());
         }
+        placed.is_deformed |= !deformed.is_empty();
         let stride = self.attribute_layout.array_stride;
         let mut attributes = Vec::new();
         for (i, mesh, range) in deformed {
@@ -361,8 +375,14 @@ impl Placed {
         for (k, drawable) in (0..).zip(&instances) {
             drawable_of[drawable.instance] = Some(k);
         }
-        let mut placed =
-            Self { instances, version: 0, drawable_of, mesh_boxes, bounds: Aabb::EMPTY };
+        let mut placed = Self {
+            instances,
+            version: 0,
+            is_deformed: false,
+            drawable_of,
+            mesh_boxes,
+            bounds: Aabb::EMPTY,
+        };
         placed.find_bounds();
         placed
     }

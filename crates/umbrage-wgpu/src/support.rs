@@ -1,4 +1,5 @@
 use crate::Error;
+use umbrage::{Cover, Partition, Size, Technique};
 use wgpu::{
     Adapter, Backend, Device, DownlevelFlags, Features, Limits, TextureFormat,
     TextureFormatFeatureFlags, TextureUsages,
@@ -22,8 +23,8 @@ use wgpu::{
 ///   there are no [clusters](crate::ClusterGeometry) but [`MeshCasters`](crate::MeshCasters) alone,
 ///   whose time grows with the number of triangles;
 /// - what clusters need, and an eleventh storage buffer in compute shaders, plans with
-///   [pages](umbrage::paged) are [`Error::Unsupported`]: take `uniform(stable)` slices, which stand
-///   still too;
+///   [pages](umbrage::paged) are [`Error::Unsupported`]: take what
+///   [`instead_of_pages`](Self::instead_of_pages) gives;
 /// - compute shaders, or fetching depths, [`SeenReadback`](crate::SeenReadback) is
 ///   [`Error::Unsupported`];
 /// - comparison samplers and fetching depths both, everything is [`Error::Unsupported`].
@@ -167,6 +168,21 @@ impl Support {
         })
     }
 
+    /// A technique that the device can draw in place of one with pages: four stable slices with the
+    /// same filter, whose texels stand still too, and as many texels as the pages share, or 2048².
+    /// `None` for techniques without pages, and if the device has them.
+    pub fn instead_of_pages(&self, technique: &Technique) -> Option<Technique> {
+        if self.pages || technique.paged_error().is_none() {
+            return None;
+        }
+        let size = match technique.size {
+            Size::Needed => Size::Budget(2048 * 2048),
+            size => size,
+        };
+        let (cover, partition) = (Cover::Stable, Partition::slices(4));
+        Some(Technique { cover, partition, size, ..*technique })
+    }
+
     /// The limits that a [`Planner`](umbrage::Planner) must know of the device.
     pub fn limits(&self) -> umbrage::Limits {
         umbrage::Limits { max_side: self.max_side, ..umbrage::Limits::default() }
@@ -226,6 +242,17 @@ mod tests {
         assert!(!support.storage_buffers && !support.depth_fetch && !support.compute);
         assert_eq!(support.max_side, 2048);
         assert_eq!([0, 1, 2, 5, 6, 12].map(|n| support.array_layers(n)), [2, 2, 2, 5, 7, 13]);
+    }
+
+    #[test]
+    fn slices_that_stand_still_replace_pages() {
+        let technique = |text: &str| text.parse::<Technique>().unwrap();
+        let support = Support { pages: false, ..Support::FULL };
+        let instead = |text| support.instead_of_pages(&technique(text)).map(|t| t.to_string());
+        assert_eq!(instead("paged:pcf3").unwrap(), "uniform(stable)+z4:pcf3@2048");
+        assert_eq!(instead("paged(error=0.5)@1024").unwrap(), "uniform(stable)+z4");
+        assert_eq!(instead("adaptive"), None);
+        assert_eq!(Support::FULL.instead_of_pages(&technique("paged")), None);
     }
 
     #[test]

@@ -105,7 +105,7 @@ impl Drawn {
 
 fn buffers(scene: &Scene) -> SceneBuffers {
     let buffers = SceneBuffers::new(&GPU, scene, false).unwrap();
-    let finest = || build_finest(&mesh_inputs(scene)).unwrap();
+    let finest = || build_finest(&mesh_inputs(scene));
     buffers.make_pages(&GPU, scene, finest).unwrap();
     buffers
 }

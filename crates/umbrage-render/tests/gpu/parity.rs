@@ -114,7 +114,7 @@ fn draw(
 ) -> Vec<Sample> {
     let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
     if plan.paging.is_some() {
-        let finest = || build_finest(&mesh_inputs(set.scene)).unwrap();
+        let finest = || build_finest(&mesh_inputs(set.scene));
         buffers.make_pages(&GPU, set.scene, finest).unwrap();
     }
     let mut renderer = Renderer::with_support(&GPU, &buffers, options, support).unwrap();

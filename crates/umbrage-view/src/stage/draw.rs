@@ -12,8 +12,8 @@ use std::time::Instant;
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles};
 use umbrage_lab::{
-    Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, milliseconds,
-    plan_with, planner, shadow_options, unfit_for_gpu,
+    Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, make_pages,
+    milliseconds, plan_with, planner, shadow_options, unfit_for_gpu,
 };
 use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
 use umbrage_trace::Tracer;
@@ -256,6 +256,8 @@ impl<'a> Artist<'a> {
         let plan = easel.plan(technique, planned_for, light, &bounds).map_err(|e| e.to_string())?;
         let plan_ms = milliseconds(start);
         let target = easel.targets.free(gpu, request.camera.image())?;
+        make_pages(gpu, buffers, tracer.scene(), technique.technique())
+            .map_err(|e| e.to_string())?;
         let (brush, mut timer) = easel.brush(gpu, buffers, technique, plan.fade.is_some())?;
         let Brush { renderer, moved, .. } = brush;
         let text = |e: umbrage_render::Error| e.to_string();

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use umbrage::visibility::{Filter, LightSize};
 use umbrage::{Camera, Light, Plan};
 use umbrage_lab::{
-    Bencher, NamedTechnique, PreparedScene, Rows, edge_on, milliseconds, plan, plan_fading,
-    shadow_options, unfit_for_gpu,
+    Bencher, NamedTechnique, PreparedScene, Rows, edge_on, make_pages, milliseconds, plan,
+    plan_fading, shadow_options, unfit_for_gpu,
 };
 use umbrage_measure::Image;
 use umbrage_render::{FrameTarget, Gpu, Renderer, Shading};
@@ -206,8 +206,9 @@ impl Worker<'_, '_> {
         let (gpu, buffers) = self.prepared.render().on_gpu().ok_or("there is no GPU")?;
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         let options = shadow_options(technique.technique(), true);
-        let mut renderer = Renderer::new(gpu, buffers, &options).map_err(text)?;
         let tracer = self.prepared.render().tracer();
+        make_pages(gpu, buffers, tracer.scene(), technique.technique()).map_err(text)?;
+        let mut renderer = Renderer::new(gpu, buffers, &options).map_err(text)?;
         for (i, camera) in cameras.iter().enumerate() {
             if (self.is_given_up)() {
                 return Err("the scene was closed".into());
