@@ -124,12 +124,14 @@ impl MeshCasters {
         page_layout: &BindGroupLayout,
         geometry: &ClusterGeometry,
     ) -> Self {
-        // What lies beside a page is discarded.
-        let fragment = match shadows.caster_needs_fragment() {
-            false => "shadow_page_clamped_fragment",
-            true => "shadow_page_fragment",
+        // What lies beside a page is clipped, or else discarded.
+        let is_clipped = shadows.support().clip_distances;
+        let fragment = match (kind, shadows.caster_needs_fragment()) {
+            (MeshKind::Opaque, false) if is_clipped => None,
+            (_, false) => Some("shadow_page_clamped_fragment"),
+            (_, true) => Some("shadow_page_fragment"),
         };
-        let stages = Stages { text, vertex: "shadow_page_vertex", fragment: Some(fragment) };
+        let stages = Stages { text, vertex: "shadow_page_vertex", fragment };
         let own = Some(geometry.vertex_layout());
         Self::of_stages(device, shadows, kind, stages, &[], page_layout, own)
     }

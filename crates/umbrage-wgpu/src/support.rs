@@ -10,6 +10,8 @@ use wgpu::{
 ///
 /// - [`Features::DEPTH_CLIP_CONTROL`], the fragment shader clamps the depths of casters in front of
 ///   a map's depth range and writes them: the same picture, but slower;
+/// - [`Features::CLIP_DISTANCES`], [pages](umbrage::paged) are drawn by discarding what lies beside
+///   them, which takes many times as long where triangles are large;
 /// - storage buffers in fragment shaders (WebGL2), lookups always read uniform buffers (see
 ///   [`LookupBuffers`](crate::LookupBuffers));
 /// - fetching depths (OpenGL, WebGL2), `hard` and `pcf` compare by
@@ -34,6 +36,8 @@ use wgpu::{
 pub struct Support {
     /// Whether the device can clamp depths to the depth range instead of clipping triangles.
     pub depth_clip_control: bool,
+    /// Whether the device can clip triangles at planes of a shader's choice.
+    pub clip_distances: bool,
     /// Whether fragment shaders can read storage buffers.
     pub storage_buffers: bool,
     /// Whether shaders can fetch single depths.
@@ -82,6 +86,7 @@ impl Support {
     /// Features that make shadows faster or allow more filters. Request those that the adapter has
     /// when you create your device. None is required.
     pub const WANTED_FEATURES: Features = Features::DEPTH_CLIP_CONTROL
+        .union(Features::CLIP_DISTANCES)
         .union(Features::FLOAT32_FILTERABLE)
         .union(Features::TEXTURE_FORMAT_16BIT_NORM)
         .union(Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
@@ -148,6 +153,7 @@ impl Support {
             && limits.max_storage_buffers_per_shader_stage >= CLUSTER_BUFFERS;
         Ok(Self {
             depth_clip_control: features.contains(Features::DEPTH_CLIP_CONTROL),
+            clip_distances: features.contains(Features::CLIP_DISTANCES),
             storage_buffers,
             depth_fetch,
             compute,
@@ -192,6 +198,7 @@ impl Support {
     #[cfg(test)]
     pub(crate) const FULL: Self = Self {
         depth_clip_control: true,
+        clip_distances: true,
         storage_buffers: true,
         depth_fetch: true,
         compute: true,

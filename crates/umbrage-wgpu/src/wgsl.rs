@@ -73,11 +73,15 @@ impl Shader {
 
     /// The shader as plain WGSL.
     fn link(&self) -> String {
-        let mut linked = String::new();
+        let is_directive = |line: &&str| line.starts_with("enable ");
+        let all_lines = self.modules().flat_map(|(_, text)| text.lines());
+        let mut linked: String =
+            all_lines.filter(is_directive).flat_map(|line| [line, "\n"]).collect();
         for (path, text) in self.modules() {
             linked += &format!("// {path}.wesl of umbrage-wgpu\n");
-            // Every import is one line.
-            for line in text.lines().filter(|line| !line.starts_with("import ")) {
+            // Every import is one line. Directives stand before all else.
+            let is_kept = |line: &&str| !line.starts_with("import ") && !is_directive(line);
+            for line in text.lines().filter(is_kept) {
                 linked += line;
                 linked.push('\n');
             }
@@ -335,6 +339,10 @@ fn page_caster_shader(
     let root = if is_masked { module!("page_masked") } else { module!("page_opaque") };
     let mut shader = Shader::new(root);
     add_page_casters(&mut shader, filter, support);
+    shader.add([match support.clip_distances {
+        true => generated::clipped_page_sides(),
+        false => module!("page_sides"),
+    }]);
     if is_masked {
         shader.add([module!("holes")]);
         add_cluster_uv(&mut shader, layout);

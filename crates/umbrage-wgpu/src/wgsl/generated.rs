@@ -413,3 +413,33 @@ fn shadow_outputs({parameters}) -> ShadowPrefiltered {{
 "
     )
 }
+
+/// `page_sides` for devices that clip at the sides of a page. WESL does not know such outputs, so
+/// the package has the module for other devices alone.
+pub(super) fn clipped_page_sides() -> Module {
+    let discards = include_str!("page_sides.wesl");
+    let clip = "    @builtin(position) clip: vec4f,\n";
+    let sides = "    @builtin(clip_distances) sides: array<f32, 4>,\n";
+    let (declared, _) = discards.split_once("// Whether a fragment").unwrap_or((discards, ""));
+    let declared = declared
+        .replace(clip, &format!("{clip}{sides}"))
+        .replace("(vertex.clip, ", "(vertex.clip, shadow_page_inside(vertex.texel), ");
+    let text = format!(
+        "\
+enable clip_distances;
+{declared}\
+// How far inside the four sides of the page a vertex is.
+fn shadow_page_inside(texel: vec3f) -> array<f32, 4> {{
+    let low = texel.xy + SHADOW_GUTTER * texel.z;
+    let high = (SHADOW_PAGE_TEXELS + SHADOW_GUTTER) * texel.z - texel.xy;
+    return array<f32, 4>(low.x, low.y, high.x, high.y);
+}}
+
+// No fragment belongs to another page.
+fn shadow_page_is_beside(texel: vec3f) -> bool {{
+    return false;
+}}
+"
+    );
+    Module { path: "page_sides", text: text.into() }
+}
