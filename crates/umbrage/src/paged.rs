@@ -19,7 +19,7 @@
 //! A receiver is looked up on the largest level whose texels are no wider across the light than
 //! `error` pixels there: with a pixel's width w in metres, and the distance d from the lamp along
 //! the grid's axis (1 under parallel light), the largest l with 2^l d ≤ `error` 2^[`bias`] w.
-//! Slopes of surfaces do not count, as in [`MapError`](crate::MapError).
+//! Slopes of surfaces do not count, as in [`MapError`].
 //!
 //! [`bias`]: Paging::bias
 //!

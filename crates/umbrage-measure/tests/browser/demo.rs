@@ -227,6 +227,9 @@ impl Compared {
                 device: None,
                 maps: 1 + u32::from(name.contains("z2")),
                 texels: 1 << 20,
+                pages: None,
+                texels_per_pixel: None,
+                bound_px: None,
                 bytes: None,
                 truth: None,
                 metrics: measure(truth.visibility, visibility, counted, &color.map(|_| 1.0))

@@ -21,7 +21,7 @@ type Entry = Arc<OnceLock<Option<Traced>>>;
 /// The pages of a plan that have been looked up so far.
 pub(super) struct Pages<'a> {
     tracer: &'a Tracer<'a>,
-    shards: [RwLock<HashMap<Page, Entry>>; SHARDS],
+    shards: Box<[RwLock<HashMap<Page, Entry>>]>,
     hasher: RandomState,
 }
 
@@ -41,7 +41,7 @@ impl<'a> Pages<'a> {
     pub(super) fn new(tracer: &'a Tracer<'a>) -> Self {
         Self {
             tracer,
-            shards: std::array::from_fn(|_| RwLock::default()),
+            shards: (0..SHARDS).map(|_| RwLock::default()).collect(),
             hasher: RandomState::new(),
         }
     }
