@@ -7,13 +7,13 @@ use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_detai
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
-use umbrage::{Bounds, Plan, Planner};
+use umbrage::{Bounds, Camera, Plan, Planner};
 use umbrage_lab::{
     Bencher, Costs, Detail, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
     milliseconds, plan, plan_with, planner,
 };
 use umbrage_measure::{LightInfo, View};
-use umbrage_scene::Scene;
+use umbrage_scene::{Scene, SceneCamera};
 
 /// Number of first frames that do not count, because pipelines are compiled and buffers grow.
 const WARM_UP: u32 = 2;
@@ -26,6 +26,8 @@ struct BenchJson {
     light: LightInfo,
     frames: u32,
     still: bool,
+    /// The speed of the camera, m/s; `null` if it stands still.
+    walk: Option<f64>,
     results: Vec<ResultJson>,
 }
 
@@ -38,6 +40,8 @@ struct ResultJson {
     gpu_timestamps: bool,
     maps: usize,
     texels: u64,
+    /// Texels drawn over texels in use, the mean over the frames after the first.
+    drawn_share: f64,
     /// Size of the memory that lookup reads.
     bytes: u64,
     storage_factor: f64,
@@ -157,7 +161,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
             contenders.push(none);
         }
     }
-    take_turns(&mut contenders, args, &view, &bounds, &bar)?;
+    take_turns(&mut contenders, args, &view, &chosen_view.view, &bounds, &bar)?;
     drop(bar);
     let results = contenders.iter().map(|contender| {
         let none = none_for(&contenders, contender.is_gpu()).context("frames without shadows")?;
@@ -175,6 +179,7 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
         light: chosen_light.info(),
         frames: args.frames,
         still: args.still,
+        walk: args.walk,
         results,
     };
     if args.json {
@@ -189,32 +194,49 @@ fn take_turns(
     contenders: &mut [Contender<'_>],
     args: &bench::Bench,
     view: &umbrage_trace::View<'_>,
+    seen_by: &SceneCamera,
     bounds: &Bounds<'_>,
     bar: &Bar,
 ) -> Result<()> {
+    let size = view.camera().image();
     let frames = WARM_UP + args.frames;
     bar.one_part(u64::from(frames) * contenders.len() as u64);
+    let (tracer, light) = (view.tracer(), view.light());
     for index in 0..frames {
+        let walked = args.walk.map(|speed| walked(seen_by, size, speed * f64::from(index) / 60.0));
+        let walked = walked.transpose()?;
+        let walked =
+            walked.map(|camera| umbrage_trace::View::new(tracer, camera, *light, 1)).transpose()?;
+        let view = walked.as_ref().unwrap_or(view);
         // The technique that comes first changes from frame to frame.
         let first = index as usize % contenders.len();
         contenders.rotate_left(first);
         for contender in contenders.iter_mut() {
             bar.stage(&contender.technique.to_string());
             let Contender { technique, bencher, planner, frames } = contender;
-            if !args.still {
+            if !args.still && args.walk.is_none() {
                 // As where the camera moves.
                 planner.forget();
             }
             let start = Instant::now();
             let plan = plan_with(planner, technique, view.camera(), view.light(), bounds)?;
             let planned = milliseconds(start);
-            let costs = bencher.frame(view, plan, args.still)?;
+            let costs = bencher.frame(view, plan, args.still || args.walk.is_some())?;
             frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
             bar.advance(1);
         }
         contenders.rotate_right(first);
     }
     Ok(())
+}
+
+/// A scene's camera that has gone forward by a distance, metres.
+fn walked(camera: &SceneCamera, size: [u32; 2], distance: f64) -> Result<Camera> {
+    let step = (camera.target - camera.eye).normalize_or_zero() * distance;
+    let mut camera = camera.clone();
+    camera.eye += step;
+    camera.target += step;
+    Ok(camera.camera(size)?)
 }
 
 /// The contender that draws the same frames without shadows, on a GPU or not.
@@ -271,7 +293,11 @@ impl<'a> Contender<'a> {
             device,
             gpu_timestamps: bencher.has_timestamps(),
             maps: plan.maps.len(),
-            texels: plan.texels(),
+            texels: first.costs.texels[0],
+            drawn_share: {
+                let share = |f: &Frame| f.costs.texels[1] as f64 / f.costs.texels[0].max(1) as f64;
+                frames[1..].iter().map(share).sum::<f64>() / (frames.len() - 1).max(1) as f64
+            },
             bytes: first.costs.bytes,
             storage_factor: plan.storage_factor(),
             map_draws: map_draws(plan, &first.costs, scene),

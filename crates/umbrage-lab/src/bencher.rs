@@ -6,6 +6,7 @@ use crate::planning::milliseconds;
 use crate::receivers::Receivers;
 use crate::strip::Rows;
 use std::time::Instant;
+use umbrage::paged::PAGE_TEXELS;
 use umbrage::{Plan, Technique};
 use umbrage_render::{Drawn, FrameTarget, Shading, StageTimes, Timer};
 use umbrage_trace::{Reference, Tracer, View};
@@ -30,6 +31,8 @@ pub struct Costs {
     pub cpu: Option<f64>,
     /// What was drawn into which map, by the map's index in the plan; `None` for the CPU reference.
     pub drawn: Option<Vec<(usize, Drawn)>>,
+    /// The texels in use, and those of them that were drawn.
+    pub texels: [u64; 2],
 }
 
 /// Draws frames of one technique and measures what they cost.
@@ -137,9 +140,16 @@ fn frame_on_gpu(
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter_ms).filter(|_| is_prefiltered && timer.is_some());
     let bytes = renderer.shadows().lookup_bytes();
+    let of_map = |&(map, _): &(usize, Drawn)| plan.maps[map].texels();
+    let texels = match renderer.page_counts() {
+        Some(pages) => {
+            [pages.wanted, pages.drawn].map(|n| u64::from(n) * u64::from(PAGE_TEXELS).pow(2))
+        }
+        None => [plan.texels(), drawn.iter().map(of_map).sum()],
+    };
     // The first frame found out how much room there must be.
     renderer.run_ahead();
-    Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn) })
+    Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn), texels })
 }
 
 fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Result<Costs, Error> {
@@ -152,5 +162,9 @@ fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Resu
     }
     let bytes = reference.bytes();
     let shade = milliseconds(shaded);
-    Ok(Costs { bytes, depth, filter: None, shade, seen: None, cpu: None, drawn: None })
+    let texels = match plan.paging {
+        Some(_) => [reference.pages() as u64 * u64::from(PAGE_TEXELS).pow(2); 2],
+        None => [plan.texels(); 2],
+    };
+    Ok(Costs { bytes, depth, filter: None, shade, seen: None, cpu: None, drawn: None, texels })
 }

@@ -27,6 +27,10 @@ pub(crate) struct Bench {
     /// Nothing moves: maps that are as they were are not drawn again.
     #[arg(long)]
     pub(crate) still: bool,
+    /// The camera goes forward at this speed, 60 frames a second, and nothing else moves: pages stay
+    /// where they are, and maps follow the camera.
+    #[arg(long, value_name = "M/S", conflicts_with = "still", value_parser = speed)]
+    pub(crate) walk: Option<f64>,
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
@@ -34,6 +38,12 @@ pub(crate) struct Bench {
     pub(crate) view: ViewArgs,
     #[command(flatten)]
     pub(crate) light: LightArgs,
+}
+
+/// Parses a speed in metres a second.
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite());
+    speed.ok_or_else(|| "must be a positive number of metres a second".to_owned())
 }
 
 impl Bench {
