@@ -304,7 +304,7 @@ impl Shadows {
         let unbound = pages.as_ref().map(|_| Buffers::stand_ins(device));
         let parts = LookupParts {
             view: looked_up(&texture, prefiltering.as_ref()),
-            pages: unbound.as_ref().map(|buffers| buffers.each_ref()),
+            pages: unbound.as_ref().map(<[wgpu::Buffer; 2]>::each_ref),
         };
         let lookup_bind_group = buffers.bind(device, &lookup_layout, &parts, &sampler);
         Ok(Self {

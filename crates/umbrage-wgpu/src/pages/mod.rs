@@ -84,6 +84,7 @@ impl PreparedPages<'_> {
     ///
     /// # Errors
     /// As for [`ClusterSelection::encode`](crate::ClusterSelection::encode).
+    #[expect(clippy::too_many_arguments, reason = "device, queue and encoder are one in spirit")]
     pub fn encode<'m>(
         self,
         device: &Device,
