@@ -1,7 +1,8 @@
-//! Paged maps through the real program, by the reference.
+//! Paged maps through the real program.
 
 use crate::desk::{Desk, keys};
 use serde_json::Value;
+use umbrage_testing::needs;
 
 const BY_RAYS: [&str; 4] = ["--backend", "reference", "--size", "160x90"];
 
@@ -133,6 +134,34 @@ fn pages_are_shown() {
     assert!(colors("p-texels.png").1 > 10);
     args[3] = "p.exr";
     desk.succeed(&args);
+}
+
+/// A GPU finds the pages of the reference, and keeps them while the camera walks.
+#[needs(gpu)]
+#[test]
+fn gpus_draw_pages() {
+    let desk = Desk::new();
+    let by = |backend: &str| {
+        let mut args = vec!["compare", "town:20", "--size", "240x135", "-o", backend, "--json"];
+        args.extend(["--shadows", "paged", "--backend", backend]);
+        let result = desk.json(&args)["results"][0].clone();
+        assert_eq!((&result["backend"], &result["bound_px"]), (&backend.into(), &1.0.into()));
+        ["wrong_fraction", "pages"].map(|name| result[name].as_f64().unwrap())
+    };
+    let [gpu, reference] = ["gpu", "reference"].map(by);
+    assert!((gpu[0] - reference[0]).abs() < 0.002, "{gpu:?} {reference:?}");
+    // The GPU's have those that stand in for others too.
+    assert!((1.0..1.3).contains(&(gpu[1] / reference[1])), "{gpu:?} {reference:?}");
+    let mut args = vec!["bench", "town:20", "--size", "240x135", "--walk", "1.4", "--json"];
+    args.extend(["--backend", "gpu", "--shadows", "paged", "--shadows", "adaptive"]);
+    let bench = desk.json(&args);
+    let share = |i: usize| bench["results"][i]["drawn_share"].as_f64().unwrap();
+    assert!(share(0) < 0.1 && share(1) == 1.0, "{} {}", share(0), share(1));
+    assert_eq!(bench["walk"], 1.4);
+    for speed in ["0", "-1", "nan", "fast"] {
+        let run = desk.run(&["bench", "pole", &format!("--walk={speed}")]);
+        assert!(run.code != 0 && run.stderr.contains("--walk"), "{}", run.stderr);
+    }
 }
 
 #[test]

@@ -23,8 +23,7 @@ fn a_window_shows_a_scene() {
     assert_eq!(shot.is_fine().size(), [640, 480]);
 }
 
-/// Each word and option of the language draws nearly the same picture; `log` and
-/// `paged` tell why they cannot.
+/// Each word and option of the language draws nearly the same picture; `log` tells why it cannot.
 #[needs(gpu, window)]
 #[test]
 fn every_word_of_the_language_is_shown() {
@@ -40,7 +39,7 @@ fn every_word_of_the_language_is_shown() {
         println!("t{i}: {technique}");
         shot.is_fine();
         // Without shadows, with a message, and half as bright.
-        if ["none", "log", "paged", "raw"].iter().any(|word| technique.contains(word)) {
+        if ["none", "log", "raw"].iter().any(|word| technique.contains(word)) {
             shot.is_unlike(&first, 1.0);
         } else {
             shot.is_like(&first, 3.0);
