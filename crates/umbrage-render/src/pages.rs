@@ -25,6 +25,9 @@ pub(crate) struct PageDrawing {
 /// How often pages are found anew, with more room each time, until all of them have some.
 const MOST_TRIALS: u32 = 8;
 
+/// How often a thread gives way to one that may be handing counts over.
+const MOST_YIELDS: u32 = 1000;
+
 impl PageDrawing {
     pub(crate) fn new(gpu: &Gpu, scene: &SceneBuffers, shadows: &Shadows) -> Result<Self, Error> {
         let share = scene.with_page_clusters(|_, has_all_detail| match has_all_detail {
@@ -123,6 +126,14 @@ impl Renderer<'_> {
             gpu.check()?;
             if is_exact {
                 gpu.wait()?;
+                // Another thread that waits for the device may be about to hand the counts over.
+                for _ in 0..MOST_YIELDS {
+                    shadows.page_counts(device);
+                    if shadows.are_pages_counted() {
+                        break;
+                    }
+                    std::thread::yield_now();
+                }
             }
             let counts = drawing.casters.counts(device);
             let pages = shadows.page_counts(device);

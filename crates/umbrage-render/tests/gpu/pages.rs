@@ -156,9 +156,13 @@ fn pages_are_kept() {
         assert_eq!(renderer.page_counts().unwrap().drawn, 0, "{name}");
         let kept = Drawn::by(&mut renderer, &set.camera, &light);
         let (fresh, _) = Drawn::of(&set, &plan, &technique);
-        // Rounding relative to another eye may move an edge over a texel's centre.
-        let differ = kept.differ(&fresh);
-        assert!(differ * 2000 <= fresh.visibility.len(), "{name}: {differ} pixels differ");
+        // Rounding relative to another eye, or in another place of the texture, may move an edge
+        // over a texel's centre.
+        let is_same = |drawn: &Drawn, when: &str| {
+            let differ = drawn.differ(&fresh);
+            assert!(differ * 2000 <= fresh.visibility.len(), "{name}, {when}: {differ} differ");
+        };
+        is_same(&kept, "kept");
         // Casters that moved dirty the pages that they cast into, and no others.
         let here = set.camera.eye() + set.camera.forward() * 3.0;
         let moved = [Aabb::new(here - 0.2, here + 0.2)];
@@ -166,12 +170,12 @@ fn pages_are_kept() {
         let counts = renderer.page_counts().unwrap();
         assert!((1..counts.wanted / 2).contains(&counts.drawn), "{name}: {counts:?}");
         let again = Drawn::by(&mut renderer, &set.camera, &light);
-        assert_eq!(again.differ(&fresh), differ, "{name}");
+        is_same(&again, "casters moved");
         renderer.draw_maps(&plan, Casters::Moved, None).unwrap();
         let counts = renderer.page_counts().unwrap();
         assert_eq!(counts.drawn, counts.wanted, "{name}");
         let all = Drawn::by(&mut renderer, &set.camera, &light);
-        assert_eq!(all.differ(&fresh), 0, "{name}");
+        is_same(&all, "all drawn again");
     }
 }
 
