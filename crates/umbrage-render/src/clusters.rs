@@ -71,8 +71,7 @@ impl SceneClusters {
         let (masked, opaque): (Vec<usize>, Vec<usize>) = all.partition(has_mask);
         let opaque_count = opaque.len() as u32;
         let materials: Vec<usize> = opaque.into_iter().chain(masked.iter().copied()).collect();
-        let batches = Batches { materials, opaque: opaque_count, masked };
-        let instances = batches.instances(buffers, &placed);
+        let instances = instances(buffers, &placed, &materials, &masked);
         let stride = buffers.attribute_layout.array_stride as u32 / 4;
         let layout = AttributeLayout { stride, uv: Some(1), alpha: (stride > 3).then_some(4) };
         let vertices = ClusterVertices {
@@ -81,17 +80,12 @@ impl SceneClusters {
         };
         let support = gpu.support();
         match ClusterGeometry::new(gpu.device(), &support, &sources, &instances, &vertices) {
-            Ok(geometry) => {
-                let Batches { materials, opaque, masked } = batches;
-                Ok(Some(Self { geometry, materials, opaque, masked }))
-            }
+            Ok(geometry) => Ok(Some(Self { geometry, materials, opaque: opaque_count, masked })),
             Err(umbrage_wgpu::Error::Unsupported { .. }) => Ok(None),
             Err(e) => Err(e.into()),
         }
     }
-}
 
-impl SceneClusters {
     /// Moves instances to where they are now.
     pub(crate) fn place(
         &mut self,
@@ -99,39 +93,31 @@ impl SceneClusters {
         buffers: &SceneBuffers,
         placed: &Placed,
     ) -> Result<(), Error> {
-        let Self { materials, opaque, masked, .. } = &*self;
-        let (materials, masked) = (materials.clone(), masked.clone());
-        let instances = Batches { materials, opaque: *opaque, masked }.instances(buffers, placed);
+        let instances = instances(buffers, placed, &self.materials, &self.masked);
         Ok(self.geometry.place(gpu.queue(), &instances)?)
     }
 }
 
-/// How instances are divided into batches: see [`SceneClusters`].
-struct Batches {
-    materials: Vec<usize>,
-    opaque: u32,
-    masked: Vec<usize>,
-}
-
-impl Batches {
-    fn instances(&self, buffers: &SceneBuffers, placed: &Placed) -> Vec<ClusterInstance> {
-        let place =
-            |list: &[usize], material| list.iter().position(|&m| m == material).unwrap_or(0) as u32;
-        let instance = |drawable: &Drawable| {
-            let material = buffers.meshes[drawable.mesh].material;
-            let of_casters = match self.masked.contains(&material) {
-                true => 1 + place(&self.masked, material),
-                false => 0,
-            };
-            ClusterInstance {
-                mesh: drawable.mesh,
-                world_from_mesh: drawable.world_from_mesh,
-                caster_batch: drawable.role.casts.then_some(of_casters),
-                seen_batch: drawable.role.is_seen.then(|| place(&self.materials, material)),
-            }
-        };
-        placed.instances.iter().map(instance).collect()
-    }
+/// Instances where they are now, in batches of these materials: see [`SceneClusters`].
+fn instances(
+    buffers: &SceneBuffers,
+    placed: &Placed,
+    materials: &[usize],
+    masked: &[usize],
+) -> Vec<ClusterInstance> {
+    let place = |list: &[usize], material| list.iter().position(|&m| m == material);
+    let instance = |drawable: &Drawable| {
+        let material = buffers.meshes[drawable.mesh].material;
+        let of_casters = place(masked, material).map_or(0, |i| 1 + i as u32);
+        let of_picture = place(materials, material).unwrap_or(0) as u32;
+        ClusterInstance {
+            mesh: drawable.mesh,
+            world_from_mesh: drawable.world_from_mesh,
+            caster_batch: drawable.role.casts.then_some(of_casters),
+            seen_batch: drawable.role.is_seen.then_some(of_picture),
+        }
+    };
+    placed.instances.iter().map(instance).collect()
 }
 
 /// A mesh's clusters in a space whose origin is `anchor`.

@@ -1,7 +1,7 @@
 //! Plans with pages: the picture's depths first, and then the pages that these want.
 
 use crate::frame_target::FrameTarget;
-use crate::renderer::{Drawn, Renderer, Shading, depth_projection, writes};
+use crate::renderer::{Drawn, Renderer, Shading, compute_writes, depth_projection, writes};
 use crate::scene::SceneBuffers;
 use crate::timer::{Stage, Timer};
 use crate::{Error, Gpu};
@@ -10,8 +10,6 @@ use umbrage::{Camera, Light, Plan};
 use umbrage_wgpu::{
     Casters, ClusterCasters, PageCasters, PageCounts, PageFrame, PageTimestamps, Shadows,
 };
-use wgpu::ComputePassTimestampWrites;
-use wgpu_profiler::GpuProfilerQuery;
 
 /// How a renderer draws pages.
 pub(crate) struct PageDrawing {
@@ -175,10 +173,6 @@ impl Renderer<'_> {
         self.draw_frame("depth", &shading, &target, timer)?;
         Ok(target)
     }
-}
-
-fn compute_writes(query: &Option<GpuProfilerQuery>) -> Option<ComputePassTimestampWrites<'_>> {
-    query.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes)
 }
 
 /// Whether all pages had room, or cannot have more.

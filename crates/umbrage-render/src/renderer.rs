@@ -21,8 +21,8 @@ use umbrage_wgpu::{
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
-    Color, CommandEncoder, CompareFunction, IndexFormat, LoadOp, Operations, PipelineLayout,
-    PipelineLayoutDescriptor, RenderPass, RenderPassColorAttachment,
+    Color, CommandEncoder, CompareFunction, ComputePassTimestampWrites, IndexFormat, LoadOp,
+    Operations, PipelineLayout, PipelineLayoutDescriptor, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites,
     RenderPipeline, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages, StoreOp,
     TextureFormat, TextureView, VertexAttribute, VertexBufferLayout, VertexFormat, VertexStepMode,
@@ -362,7 +362,7 @@ impl<'g> Renderer<'g> {
             let filter = if is_prefiltered { begin(Stage::Filter) } else { None };
             let timestamps = Timestamps { depth: writes(&depth), filter: writes(&filter) };
             let casters = &mut drawing.casters;
-            let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
+            let times = compute_writes(&choice);
             casters.choose(device, queue, &mut encoder, &own.geometry, &prepared, times)?;
             prepared.encode(&mut encoder, &timestamps, |map| {
                 let index = map.redraw.index;
@@ -497,7 +497,7 @@ impl<'g> Renderer<'g> {
         let mut list = 0..0;
         if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
             let choice = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
-            let times = choice.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes);
+            let times = compute_writes(&choice);
             let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
             let (device, queue) = (gpu.device(), gpu.queue());
             let ClusterDrawing { picture, occluders, hiding, depths, .. } = drawing;
@@ -746,6 +746,12 @@ impl<'a, 'p, 'e> Drawer<'a, 'p, 'e> {
 /// The forward shader, after the lookup module that it calls.
 pub(crate) fn shader_text(lookup: &str) -> String {
     [lookup, include_str!("wgsl/forward.wgsl"), include_str!("wgsl/overlay.wgsl")].join("\n")
+}
+
+pub(crate) fn compute_writes(
+    query: &Option<GpuProfilerQuery>,
+) -> Option<ComputePassTimestampWrites<'_>> {
+    query.as_ref().and_then(GpuProfilerQuery::compute_pass_timestamp_writes)
 }
 
 pub(crate) fn writes(query: &Option<GpuProfilerQuery>) -> Option<RenderPassTimestampWrites<'_>> {

@@ -137,7 +137,7 @@ fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
     }
     if pages {
         add_pages(&mut shader, &filter);
-        shader.add([module!("served/pages"), module!("page_corner")]);
+        shader.add([module!("served/pages"), module!("page_corner"), module!("page_place")]);
     } else {
         shader.add([module!("served/maps")]);
     }
@@ -354,7 +354,8 @@ fn page_caster_shader(
 fn add_page_casters(shader: &mut Shader, filter: &Filter, support: &Support) {
     shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
     shader.constant("SHADOW_DEVICE_CLAMPS", support.depth_clip_control);
-    shader.add([module!("page_casters"), module!("maps"), module!("page_types")]);
+    let own = [module!("page_casters"), module!("page_place"), module!("page_types")];
+    shader.add(own.into_iter().chain([module!("maps")]));
 }
 
 /// The module that reads the viewer's depths.

@@ -30,8 +30,8 @@ pub(crate) struct PlacedPage {
     pub(crate) index: [i32; 2],
     pub(crate) slot: u32,
     pub(crate) wanted: u32,
-    pub(crate) drawn: u32,
     pub(crate) is_stale: u32,
+    pub(crate) padding: u32,
 }
 
 /// `SHADOW_PAGE_EMPTY` of `wgsl/page_types.wesl`.
@@ -92,11 +92,11 @@ pub(crate) struct Pool {
 }
 
 /// Words of the state of all pages, and the places in it: see `wgsl/page_types.wesl`.
-pub(crate) const STATE_WORDS: usize = 8;
+pub(crate) const STATE_WORDS: usize = 7;
 pub(crate) const BIAS: usize = 3;
 pub(crate) const MISSING: usize = 4;
 pub(crate) const FRESH: usize = 5;
-pub(crate) const USED: usize = 7;
+pub(crate) const USED: usize = 6;
 
 /// Words of the table's head.
 pub(crate) const TABLE_HEAD: u32 = 8;

@@ -96,7 +96,7 @@ impl PreparedPages<'_> {
         timestamps: PageTimestamps<'_>,
     ) -> Result<u32, Error> {
         let Self { shadows, plan, render_origin } = self;
-        let (Some(paging), Some(pages)) = (&plan.paging, &mut shadows.pages) else { return Ok(0) };
+        let Some(pages) = &mut shadows.pages else { return Ok(0) };
         if plan.maps.is_empty() {
             return Ok(0);
         }
@@ -112,7 +112,6 @@ impl PreparedPages<'_> {
                 ClusterView::of_pages(planned, own, render_origin, casters.share())
             });
         let views: Vec<_> = views.collect();
-        debug_assert_eq!(views.len(), paging.levels.len());
         let Some(shown) = pages.shown_group(device, geometry) else { return Ok(0) };
         casters.choose(device, queue, encoder, geometry, &views, render_origin, shown, choice)?;
         let texture = &mut shadows.texture;

@@ -394,7 +394,7 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPlacedPage",
         ours::PlacedPage,
-        [map, slab, index, slot, wanted, drawn, is_stale]
+        [map, slab, index, slot, wanted, is_stale]
     );
     check_layout!(&module, "ShadowFreshPage", ours::FreshPage, [place, map, page, slot]);
     check_layout!(
