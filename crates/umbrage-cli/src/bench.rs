@@ -65,6 +65,10 @@ struct DrawnJson {
 #[derive(Serialize)]
 struct TimesJson {
     plan: Option<Spread>,
+    /// The viewer's depths ahead of pages; `null` without pages or timestamps.
+    prepass: Option<Spread>,
+    /// Finding the pages that are wanted, and what casts into those to draw; `null` likewise.
+    pages: Option<Spread>,
     depth: Option<Spread>,
     filter: Option<Spread>,
     shade: Option<Spread>,
@@ -285,7 +289,8 @@ impl<'a> Contender<'a> {
         let cost = |(frame, none): (&Frame, &Frame)| {
             let Frame { plan, costs, .. } = frame;
             let lookup = costs.shade - none.costs.shade;
-            plan + costs.depth + costs.filter.unwrap_or(0.0) + lookup
+            let found = costs.pages.unwrap_or(0.0);
+            plan + found + costs.depth + costs.filter.unwrap_or(0.0) + lookup
         };
         Ok(ResultJson {
             shadows: technique.to_string(),
@@ -303,6 +308,8 @@ impl<'a> Contender<'a> {
             map_draws: map_draws(plan, &first.costs, scene),
             ms: TimesJson {
                 plan: self.spread(|f| Some(f.plan)),
+                prepass: self.spread(|f| f.costs.prepass),
+                pages: self.spread(|f| f.costs.pages),
                 depth: self.spread(|f| Some(f.costs.depth)),
                 filter: self.spread(|f| f.costs.filter),
                 shade: self.spread(|f| Some(f.costs.shade)),
@@ -344,6 +351,8 @@ fn table(bench: &BenchJson) -> String {
     let heads = [
         "median ms of",
         "plan",
+        "prepass",
+        "pages",
         "depth",
         "filter",
         "shade",
@@ -368,6 +377,8 @@ fn table(bench: &BenchJson) -> String {
         vec![
             r.shadows.clone(),
             ms(r.ms.plan, 3),
+            ms(r.ms.prepass, 2),
+            ms(r.ms.pages, 2),
             ms(r.ms.depth, 2),
             ms(r.ms.filter, 2),
             ms(r.ms.shade, 2),

@@ -17,7 +17,12 @@ use umbrage_wgpu::{Casters, SeenReadback};
 pub struct Costs {
     /// Memory that lookup reads, bytes.
     pub bytes: u64,
-    /// Time to draw the maps.
+    /// Time to draw the viewer's depths ahead of pages; `None` without pages, or without timestamps.
+    pub prepass: Option<f64>,
+    /// Time to find the pages that are wanted, their places, and what casts into those to draw;
+    /// `None` as for `prepass`.
+    pub pages: Option<f64>,
+    /// Time to draw the maps. Without timestamps it has all that comes ahead of the picture.
     pub depth: f64,
     /// Time to prefilter the maps; `None` without a prefilter, or if `depth` includes this time.
     pub filter: Option<f64>,
@@ -135,7 +140,7 @@ fn frame_on_gpu(
         }
     };
     let cpu = Some(for_maps + for_picture);
-    let StageTimes { depth_ms, filter_ms, picture_ms: shade } = times;
+    let StageTimes { prepass_ms, pages_ms, depth_ms, filter_ms, picture_ms: shade } = times;
     let depth = if drawn.is_empty() { 0.0 } else { depth_ms };
     let is_prefiltered = renderer.shadows().options().filter.prefilter().is_some();
     let filter = Some(filter_ms).filter(|_| is_prefiltered && timer.is_some());
@@ -147,9 +152,12 @@ fn frame_on_gpu(
         }
         None => [plan.texels(), drawn.iter().map(of_map).sum()],
     };
+    let of_pages = |ms| Some(ms).filter(|_| plan.paging.is_some() && timer.is_some());
+    let [prepass, pages] = [prepass_ms, pages_ms].map(of_pages);
     // The first frame found out how much room there must be.
     renderer.run_ahead();
-    Ok(Costs { bytes, depth, filter, shade, seen: None, cpu, drawn: Some(drawn), texels })
+    let (seen, drawn) = (None, Some(drawn));
+    Ok(Costs { bytes, prepass, pages, depth, filter, shade, seen, cpu, drawn, texels })
 }
 
 fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Result<Costs, Error> {
@@ -166,5 +174,16 @@ fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Resu
         Some(_) => [reference.pages() as u64 * u64::from(PAGE_TEXELS).pow(2); 2],
         None => [plan.texels(); 2],
     };
-    Ok(Costs { bytes, depth, filter: None, shade, seen: None, cpu: None, drawn: None, texels })
+    Ok(Costs {
+        bytes,
+        prepass: None,
+        pages: None,
+        depth,
+        filter: None,
+        shade,
+        seen: None,
+        cpu: None,
+        drawn: None,
+        texels,
+    })
 }

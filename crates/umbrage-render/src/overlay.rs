@@ -1,6 +1,7 @@
 //! Frames that show what the maps do or what was drawn, over the picture or in its place.
 
 use crate::renderer::Renderer;
+use crate::timer::Stage;
 use crate::{Drawn, Error, FrameTarget, Shading, Timer};
 use bytemuck::{Pod, Zeroable};
 
@@ -96,6 +97,6 @@ impl Renderer<'_> {
     ) -> Result<Drawn, Error> {
         let uniform = OverlayUniform::new(overlay, shading.camera.far())?;
         self.gpu.queue().write_buffer(&self.overlay_buffer, 0, bytemuck::bytes_of(&uniform));
-        self.draw_frame("overlay", shading, target, timer)
+        self.draw_frame("overlay", Stage::Picture, shading, target, timer)
     }
 }

@@ -99,8 +99,9 @@ impl Renderer<'_> {
             let frame = PageFrame { plan, render_origin: eye, casters, depth, projection };
             let prepared = shadows.prepare_pages(device, queue, &frame)?;
             let mut encoder = device.create_command_encoder(&Default::default());
-            let mut begin = || timer.as_ref().map(|t| t.begin(Stage::Depth, &mut encoder));
-            let [request, choice, depth] = [begin(), begin(), begin()];
+            let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
+            let [request, choice, depth] =
+                [Stage::Pages, Stage::Pages, Stage::Depth].map(&mut begin);
             let timestamps = PageTimestamps {
                 request: compute_writes(&request),
                 choice: compute_writes(&choice),
@@ -170,7 +171,7 @@ impl Renderer<'_> {
         // The light does not matter for depths.
         let light = Light::Directional { direction: DVec3::NEG_Y };
         let shading = Shading { camera, light: &light, light_index: 0 };
-        self.draw_frame("depth", &shading, &target, timer)?;
+        self.draw_frame("depth", Stage::Prepass, &shading, &target, timer)?;
         Ok(target)
     }
 }

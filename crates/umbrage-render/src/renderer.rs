@@ -407,13 +407,14 @@ impl<'g> Renderer<'g> {
         target: &FrameTarget,
         timer: Option<&mut Timer>,
     ) -> Result<Drawn, Error> {
-        self.draw_frame("frame", shading, target, timer)
+        self.draw_frame("frame", Stage::Picture, shading, target, timer)
     }
 
     /// Draws a frame by the fragment shaders of this name.
     pub(crate) fn draw_frame(
         &mut self,
         name: &'static str,
+        stage: Stage,
         shading: &Shading<'_>,
         target: &FrameTarget,
         mut timer: Option<&mut Timer>,
@@ -423,7 +424,8 @@ impl<'g> Renderer<'g> {
         let color = &[&target.color_view][..];
         let (depth, depth_store) = (&target.depth, StoreOp::Store);
         let (share_px, is_frame) = (FRAME_SHARE_PX, true);
-        let parts = Target { color, depth, depth_store, share_px, is_frame, pipelines: &pipelines };
+        let pipelines = &pipelines;
+        let parts = Target { color, depth, depth_store, share_px, is_frame, pipelines, stage };
         loop {
             let mut encoder = self.gpu.device().create_command_encoder(&Default::default());
             let timer = timer.as_deref_mut();
@@ -492,11 +494,11 @@ impl<'g> Renderer<'g> {
         let view = ViewUniform::new(camera, light, light_index, tile, scene.farthest(camera));
         gpu.queue().write_buffer(&self.view_buffer, 0, bytemuck::bytes_of(&view));
         let planes = tile.planes(camera);
-        let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+        let query = timer.as_ref().map(|t| t.begin(target.stage, encoder));
         let mut queries = vec![];
         let mut list = 0..0;
         if let (Some(own), Some(drawing)) = (&scene.clusters, clusters.as_mut()) {
-            let choice = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+            let choice = timer.as_ref().map(|t| t.begin(target.stage, encoder));
             let times = compute_writes(&choice);
             let view = picture_view(camera, tile, &view, &planes, target.share_px)?;
             let (device, queue) = (gpu.device(), gpu.queue());
@@ -506,7 +508,7 @@ impl<'g> Renderer<'g> {
             }
             let (geometry, eye) = (&own.geometry, camera.eye());
             let mut draw_depths = |encoder: &mut CommandEncoder, picture: &_, group: &_| {
-                let query = timer.as_ref().map(|t| t.begin(Stage::Picture, encoder));
+                let query = timer.as_ref().map(|t| t.begin(target.stage, encoder));
                 let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
                     label: Some("depths"),
                     color_attachments: &[],
@@ -682,6 +684,8 @@ pub(crate) struct Target<'a> {
     /// Whether the picture follows another one, which it resembles.
     pub(crate) is_frame: bool,
     pub(crate) pipelines: &'a Pipelines,
+    /// The stage that the time counts as.
+    pub(crate) stage: Stage,
 }
 
 /// Draws meshes into a pass. The vertex buffers are set once.

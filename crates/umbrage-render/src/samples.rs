@@ -3,6 +3,7 @@
 use crate::clusters::{FRAME_SHARE_PX, SAMPLE_SHARE_PX};
 use crate::pipelines::Pipelines;
 use crate::renderer::{Drawn, Renderer, Shading, Target};
+use crate::timer::Stage;
 use crate::view::Tile;
 use crate::{Error, Gpu};
 use glam::{Vec2, Vec3, Vec4};
@@ -228,8 +229,8 @@ impl Layers {
         let mut first_layer = 0;
         for &Pass { ref pipelines, textures, share_px } in passes {
             let color = &color[..textures];
-            let (depth, is_frame) = (&depth, false);
-            let target = Target { color, depth, depth_store, share_px, is_frame, pipelines };
+            let (depth, is_frame, stage) = (&depth, false, Stage::Picture);
+            let target = Target { color, depth, depth_store, share_px, is_frame, pipelines, stage };
             loop {
                 let mut encoder = device.create_command_encoder(&Default::default());
                 renderer.encode_picture(&mut encoder, shading, &full, &target, None)?;

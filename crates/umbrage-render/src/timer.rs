@@ -16,6 +16,11 @@ pub struct Timer {
 /// A stage of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// The passes that draw the viewer's depths, which plans with pages need ahead of these.
+    Prepass,
+    /// The passes that find the pages which the viewer's depths want, and what casts into those to
+    /// draw.
+    Pages,
     /// The passes that draw casters into maps.
     Depth,
     /// The passes of the prefilter.
@@ -27,6 +32,8 @@ pub enum Stage {
 impl Stage {
     fn label(self) -> &'static str {
         match self {
+            Self::Prepass => "prepass",
+            Self::Pages => "pages",
             Self::Depth => "depth",
             Self::Filter => "filter",
             Self::Picture => "picture",
@@ -37,6 +44,10 @@ impl Stage {
 /// The times that the stages of a frame took on the GPU, milliseconds; 0 for stages without passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageTimes {
+    /// Time to draw the viewer's depths ahead of pages.
+    pub prepass_ms: f64,
+    /// Time to find the pages that are wanted, and what casts into those to draw.
+    pub pages_ms: f64,
     /// Time to draw casters into maps.
     pub depth_ms: f64,
     /// Time to prefilter the maps.
@@ -136,6 +147,8 @@ impl Timer {
             spans.fold(0.0, |ms, t| ms + 1e3 * (t.end - t.start).max(0.0))
         };
         Some(StageTimes {
+            prepass_ms: ms(Stage::Prepass),
+            pages_ms: ms(Stage::Pages),
             depth_ms: ms(Stage::Depth),
             filter_ms: ms(Stage::Filter),
             picture_ms: ms(Stage::Picture),

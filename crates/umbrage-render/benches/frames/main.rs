@@ -187,9 +187,10 @@ impl<'a> Set<'a> {
         let drawn = renderer.draw_maps(plan, Casters::Moved, self.timer.borrow_mut().as_mut())?;
         let mut times = Times { plan: planned, ..Times::default() };
         if !drawn.is_empty() {
-            let StageTimes { depth_ms, filter_ms, picture_ms: wall_ms } = self.read(start)?;
+            let StageTimes { pages_ms, depth_ms, filter_ms, picture_ms: wall_ms, .. } =
+                self.read(start)?;
             // Only without timestamps is there time of a picture.
-            times.depth = depth_ms + wall_ms;
+            times.depth = pages_ms + depth_ms + wall_ms;
             times.filter = filter_ms;
         }
         times.shade = self.picture(renderer)?;
