@@ -115,19 +115,21 @@ impl MeshCasters {
         Self::of_stages(device, shadows, kind, stages, buffers, shadows.caster_layout(), own)
     }
 
-    /// Draws a geometry's clusters into pages, which the bind group of `page_layout` tells of.
+    /// Draws a geometry's clusters into pages, which the bind group of `page_layout` tells of. Their
+    /// triangles lie inside the pages or not.
     pub(crate) fn of_pages(
         device: &Device,
         shadows: &Shadows,
         kind: MeshKind,
         text: String,
+        are_inside: bool,
         page_layout: &BindGroupLayout,
         geometry: &ClusterGeometry,
     ) -> Self {
         // What lies beside a page is clipped, or else discarded.
-        let is_clipped = shadows.support().clip_distances;
+        let discards = !are_inside && !shadows.support().clip_distances;
         let fragment = match (kind, shadows.caster_needs_fragment()) {
-            (MeshKind::Opaque, false) if is_clipped => None,
+            (MeshKind::Opaque, false) if !discards => None,
             (_, false) => Some("shadow_page_clamped_fragment"),
             (_, true) => Some("shadow_page_fragment"),
         };

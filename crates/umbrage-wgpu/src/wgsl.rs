@@ -319,15 +319,28 @@ fn page_clear_shader(filter: &Filter, support: &Support) -> Shader {
     shader
 }
 
-/// The text of the shader that draws clusters into pages, with the pages in bind group 0, the mask
-/// in bind group 1 and the clusters in bind group 2.
+/// The text of the pass that finds the triangles of clusters that pages show.
+pub(crate) fn page_triangles(filter: &Filter) -> String {
+    page_triangles_shader(filter).link()
+}
+
+fn page_triangles_shader(filter: &Filter) -> Shader {
+    let mut shader = Shader::new(module!("page_triangles"));
+    shader.constant("SHADOW_GUTTER", filter.reach_texels() as f32);
+    shader.add([module!("cluster_corners"), module!("cluster_types"), module!("page_types")]);
+    shader
+}
+
+/// The text of the shader that draws triangles of clusters into pages, which they are inside or not,
+/// with the pages in bind group 0, the mask in bind group 1 and the clusters in bind group 2.
 pub(crate) fn page_caster(
     support: &Support,
     filter: &Filter,
     layout: AttributeLayout,
     is_masked: bool,
+    are_inside: bool,
 ) -> String {
-    page_caster_shader(support, filter, layout, is_masked).link()
+    page_caster_shader(support, filter, layout, is_masked, are_inside).link()
 }
 
 fn page_caster_shader(
@@ -335,13 +348,15 @@ fn page_caster_shader(
     filter: &Filter,
     layout: AttributeLayout,
     is_masked: bool,
+    are_inside: bool,
 ) -> Shader {
     let root = if is_masked { module!("page_masked") } else { module!("page_opaque") };
     let mut shader = Shader::new(root);
     add_page_casters(&mut shader, filter, support);
-    shader.add([match support.clip_distances {
-        true => generated::clipped_page_sides(),
-        false => module!("page_sides"),
+    shader.add([match (are_inside, support.clip_distances) {
+        (true, _) => module!("page_sides/none"),
+        (false, true) => generated::clipped_page_sides(),
+        (false, false) => module!("page_sides/discarded"),
     }]);
     if is_masked {
         shader.add([module!("holes")]);
@@ -642,7 +657,7 @@ pub(crate) fn cluster_indices() -> String {
 
 fn cluster_indices_shader() -> Shader {
     let mut shader = Shader::new(module!("cluster_indices"));
-    shader.add([module!("cluster_types")]);
+    shader.add([module!("cluster_corners"), module!("cluster_types")]);
     shader
 }
 

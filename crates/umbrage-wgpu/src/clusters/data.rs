@@ -117,6 +117,8 @@ pub(crate) struct Choice {
     pub(crate) first: u32,
     pub(crate) block: u32,
     pub(crate) page: u32,
+    pub(crate) padding: [u32; 2],
+    pub(crate) rows: [[f32; 4]; 3],
 }
 
 /// `ShadowClusterDrawing`.
@@ -127,6 +129,7 @@ pub(crate) struct Drawing {
     pub(crate) spans: u32,
     pub(crate) choices: u32,
     pub(crate) triangles: u32,
+    pub(crate) in_pages: u32,
 }
 
 /// `ShadowClusterIndexing`.
@@ -136,6 +139,7 @@ pub(crate) struct Indexing {
     pub(crate) choices: u32,
     pub(crate) triangles: u32,
     pub(crate) blocks: u32,
+    pub(crate) draws: u32,
 }
 
 /// `ShadowClusterSpan`.
@@ -171,6 +175,7 @@ pub(crate) struct Picture {
 pub(crate) const CHOSEN: usize = 32;
 pub(crate) const TRIANGLES: usize = 33;
 pub(crate) const BLOCKS: usize = 34;
+pub(crate) const SHOWN: usize = 35;
 pub(crate) const DRAWS: usize = 40;
 
 /// A point in two parts, which together hold it in double precision almost.

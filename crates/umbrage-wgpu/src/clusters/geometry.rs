@@ -106,6 +106,8 @@ pub(crate) struct Pipelines {
     pub(crate) round_layout: BindGroupLayout,
     pub(crate) draws_layout: BindGroupLayout,
     pub(crate) indices_layout: BindGroupLayout,
+    /// Of the pass that writes indices for pages.
+    pub(crate) triangles_layout: BindGroupLayout,
     pub(crate) vertex_layout: BindGroupLayout,
     pub(crate) hidden_layout: BindGroupLayout,
     pub(crate) shown_layout: BindGroupLayout,
@@ -404,6 +406,10 @@ impl Pipelines {
             layout(compute, &[Uniform, WRITTEN, WRITTEN, WRITTEN, READ, WRITTEN], false);
         let indices_layout =
             layout(compute, &[Uniform, READ, READ, READ, READ, READ, WRITTEN, WRITTEN], false);
+        let of_indices = [Uniform, WRITTEN, READ, READ, READ, READ, WRITTEN, WRITTEN];
+        let of_triangles = [&of_indices[..], &[WRITTEN, READ, READ]].concat();
+        let triangles_layout = layout(compute, &of_triangles, false);
+        let shown_layout = layout(compute, &[READ], false);
         let vertex_layout =
             layout(ShaderStages::VERTEX, &[Uniform, READ, READ, READ, READ, READ], false);
         let of_types = |types: &[BindingType]| {
@@ -453,7 +459,6 @@ impl Pipelines {
                 cache: None,
             })
         };
-        let shown_layout = layout(compute, &[READ], false);
         let of_descent = [Some(&descent_layout), Some(&round_layout), Some(&hidden_layout)];
         let [first, second, third] = of_descent;
         let of_pages = [first, second, third, Some(&shown_layout)];
@@ -470,6 +475,7 @@ impl Pipelines {
             round_layout,
             draws_layout,
             indices_layout,
+            triangles_layout,
             vertex_layout,
             hidden_layout,
             occluders_layout,

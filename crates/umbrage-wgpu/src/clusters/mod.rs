@@ -16,6 +16,7 @@ pub use geometry::{
     AttributeLayout, ClusterGeometry, ClusterInstance, ClusterSource, ClusterVertices,
 };
 pub use occluders::ClusterOccluders;
+pub(crate) use selection::ForPages;
 pub use selection::{ClusterCounts, ClusterSelection};
 pub use view::ClusterView;
 pub(crate) use view::PagesOfView;

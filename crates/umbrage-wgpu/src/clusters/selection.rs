@@ -10,7 +10,7 @@ use std::ops::Range;
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer,
     BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassDescriptor,
-    ComputePassTimestampWrites, Device, IndexFormat, PollType, Queue, RenderPass,
+    ComputePassTimestampWrites, ComputePipeline, Device, IndexFormat, PollType, Queue, RenderPass,
 };
 
 /// The most rounds of a descent: eight to the power of these is more than there can be instances
@@ -81,6 +81,7 @@ struct Buffers {
     planes: Buffer,
     spans: Buffer,
     drawing: Buffer,
+    indexing: Buffer,
     queues: [Buffer; 2],
     counts: Buffer,
     /// Workgroups of even and of odd rounds, and those that write indices.
@@ -94,6 +95,8 @@ struct Buffers {
     round_groups: [BindGroup; 2],
     draws_group: BindGroup,
     indices_group: BindGroup,
+    /// Of the triangles that pages show.
+    triangles_group: BindGroup,
     origin: Buffer,
     vertex_group: BindGroup,
 }
@@ -112,8 +115,15 @@ struct Others<'a> {
     /// The bind group of what hides clusters.
     hides: Option<&'a BindGroup>,
     has_occluders: bool,
+    pages: Option<&'a ForPages<'a>>,
+}
+
+/// What a choice for pages depends on.
+pub(crate) struct ForPages<'a> {
     /// The bind group of the pages that are fresh.
-    shown: Option<&'a BindGroup>,
+    pub(crate) shown: &'a BindGroup,
+    /// The pipeline that finds the triangles which they show.
+    pub(crate) triangles: &'a ComputePipeline,
 }
 
 /// A choice whose counts are on their way.
@@ -123,6 +133,7 @@ struct Pending {
     room: Room,
     relief: f32,
     has_occluders: bool,
+    in_pages: bool,
 }
 
 /// Words of the counts that come back.
@@ -190,22 +201,22 @@ impl ClusterSelection {
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) -> Result<(), Error> {
         let hides = occluders.and_then(ClusterOccluders::group);
-        let others = Others { hides, has_occluders: occluders.is_some(), shown: None };
+        let others = Others { hides, has_occluders: occluders.is_some(), pages: None };
         let to = (device, queue, encoder);
         self.encode_with(to, geometry, views, render_origin, together, &others, timestamps)
     }
 
-    /// Encodes the choice of clusters for the fresh pages of maps, of which `shown` tells.
+    /// Encodes the choice of clusters for the fresh pages of maps.
     pub(crate) fn encode_pages(
         &mut self,
         to: (&Device, &Queue, &mut CommandEncoder),
         geometry: &ClusterGeometry,
         views: &[ClusterView],
         render_origin: DVec3,
-        shown: &BindGroup,
+        pages: &ForPages<'_>,
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) -> Result<(), Error> {
-        let others = Others { hides: None, has_occluders: false, shown: Some(shown) };
+        let others = Others { hides: None, has_occluders: false, pages: Some(pages) };
         self.encode_with(to, geometry, views, render_origin, 0, &others, timestamps)
     }
 
@@ -242,14 +253,18 @@ impl ClusterSelection {
             planes.extend_from_slice(&view.planes);
             let batches =
                 if view.is_picture { geometry.seen_batches } else { geometry.caster_batches };
-            spans.push(Span { first: first_draw, count: together.min(batches) });
+            if view.pages.is_none() {
+                spans.push(Span { first: first_draw, count: together.min(batches) });
+            }
             draws = first_draw + batches;
         }
         self.draws = draws;
         let wanted = Sizes {
             views: data.len(),
             planes: planes.len(),
-            draws: draws as usize + spans.len(),
+            // In pages, one draw of each batch for triangles inside, and one for others.
+            draws: draws as usize
+                + if others.pages.is_some() { draws as usize } else { spans.len() },
             spans: spans.len(),
         };
         self.room.queue = self.room.queue.max(views.len() as u32);
@@ -282,8 +297,14 @@ impl ClusterSelection {
             spans: spans.len() as u32,
             choices: room.choices,
             triangles: room.triangles,
+            in_pages: others.pages.is_some().into(),
         };
         write(&buffers.drawing, bytemuck::bytes_of(&drawing));
+        let Room { choices, triangles, blocks, .. } = room;
+        write(
+            &buffers.indexing,
+            bytemuck::bytes_of(&Indexing { choices, triangles, blocks, draws }),
+        );
         let items =
             (0..views.len() as u32).map(|view| Item { view, instance: 0, node: geometry.root });
         write(&buffers.queues[0], bytemuck::cast_slice(&items.collect::<Vec<_>>()));
@@ -301,10 +322,10 @@ impl ClusterSelection {
                 timestamp_writes: timestamps,
             });
             let pipelines = &geometry.pipelines;
-            match (others.shown, &pipelines.descend_pages) {
-                (Some(shown), Some(descend)) => {
+            match (others.pages, &pipelines.descend_pages) {
+                (Some(pages), Some(descend)) => {
                     pass.set_pipeline(descend);
-                    pass.set_bind_group(3, shown, &[]);
+                    pass.set_bind_group(3, pages.shown, &[]);
                 }
                 _ => pass.set_pipeline(&pipelines.descend),
             }
@@ -319,15 +340,25 @@ impl ClusterSelection {
             pass.set_pipeline(&pipelines.draws);
             pass.set_bind_group(0, &buffers.draws_group, &[]);
             pass.dispatch_workgroups(1, 1, 1);
-            pass.set_pipeline(&pipelines.indices);
-            pass.set_bind_group(0, &buffers.indices_group, &[]);
+            match others.pages {
+                Some(pages) => {
+                    pass.set_pipeline(pages.triangles);
+                    pass.set_bind_group(0, &buffers.triangles_group, &[]);
+                }
+                None => {
+                    pass.set_pipeline(&pipelines.indices);
+                    pass.set_bind_group(0, &buffers.indices_group, &[]);
+                }
+            }
             pass.dispatch_workgroups_indirect(&buffers.index_groups, 0);
         }
         self.encoded += 1;
         self.placements = geometry.placements;
         if let Some(slot) = self.slots.iter_mut().find(|slot| slot.is_free()) {
             let (number, has_occluders) = (self.encoded, others.has_occluders);
-            slot.send(encoder, &buffers.counts, Pending { number, room, relief, has_occluders });
+            let in_pages = others.pages.is_some();
+            let pending = Pending { number, room, relief, has_occluders, in_pages };
+            slot.send(encoder, &buffers.counts, pending);
         }
         Ok(())
     }
@@ -424,7 +455,7 @@ impl ClusterSelection {
 
     /// Takes in the counts of a choice, and makes room where there was too little.
     fn learn(&mut self, pending: Pending, words: &[u32; COUNTED]) {
-        let Pending { number, room, relief, has_occluders } = pending;
+        let Pending { number, room, relief, has_occluders, in_pages } = pending;
         if number <= self.counted {
             return;
         }
@@ -438,7 +469,7 @@ impl ClusterSelection {
             && blocks <= room.blocks;
         self.counted = number;
         self.counts = ClusterCounts {
-            triangles: u64::from(triangles),
+            triangles: u64::from(if in_pages { words[data::SHOWN] } else { triangles }),
             clusters: u64::from(chosen),
             is_complete,
             has_occluders,
@@ -539,11 +570,7 @@ impl Buffers {
         let planes = of_size(room_for(sizes.planes, 16), STORED);
         let spans = of_size(room_for(sizes.spans, size_of::<Span>()), STORED);
         let drawing = uniform(size_of::<Drawing>());
-        let indexing = buffer(
-            device,
-            &[Indexing { choices: room.choices, triangles: room.triangles, blocks: room.blocks }],
-            BufferUsages::UNIFORM,
-        );
+        let indexing = uniform(size_of::<Indexing>());
         let queues =
             [(); 2].map(|()| of_size(u64::from(room.queue) * size_of::<Item>() as u64, STORED));
         let counts =
@@ -599,7 +626,23 @@ impl Buffers {
             ),
             indices_group: group(
                 &pipelines.indices_layout,
-                &[&indexing, &counts, &choices, clusters, triangles, &firsts, &drawn, &indices],
+                &[&indexing, &counts, &choices, triangles, clusters, &firsts, &drawn, &indices],
+            ),
+            triangles_group: group(
+                &pipelines.triangles_layout,
+                &[
+                    &indexing,
+                    &counts,
+                    &choices,
+                    triangles,
+                    clusters,
+                    &firsts,
+                    &drawn,
+                    &indices,
+                    &draws,
+                    vertices,
+                    &geometry.positions,
+                ],
             ),
             vertex_group: group(
                 &pipelines.vertex_layout,
@@ -612,6 +655,7 @@ impl Buffers {
             planes,
             spans,
             drawing,
+            indexing,
             queues,
             counts,
             groups,

@@ -88,7 +88,11 @@ impl ClusterView {
         render_origin: DVec3,
         share: f32,
     ) -> Self {
-        let planes = map.caster_planes.iter().map(|p| p.normal.extend(p.offset).as_vec4());
+        // Under parallel light the window's four sides, which come first, bound what its pages may
+        // show, and each ball is tested against those pages.
+        let sides = if map.apex.is_none() { 4 } else { 0 };
+        let planes = map.caster_planes.iter().skip(sides);
+        let planes = planes.map(|p| p.normal.extend(p.offset).as_vec4());
         Self { share, pages: Some(pages), ..Self::of_map(map, planes, render_origin) }
     }
 

@@ -1,20 +1,27 @@
 use super::Pages;
-use crate::clusters::check_share;
+use super::pool::triangles_pipeline;
+use crate::clusters::{ForPages, check_share};
 use crate::{
     ClusterCounts, ClusterGeometry, ClusterSelection, ClusterView, Error, Mask, MeshCasters,
     MeshKind, Shadows, wgsl,
 };
 use glam::DVec3;
-use wgpu::{BindGroup, CommandEncoder, ComputePassTimestampWrites, Device, Queue, RenderPass};
+use wgpu::{
+    BindGroup, CommandEncoder, ComputePassTimestampWrites, ComputePipeline, Device, Queue,
+    RenderPass,
+};
 
 /// Draws clusters into pages: in each page, for each of its places, as many triangles as its texels
 /// can tell from the whole mesh. As [`ClusterCasters`](crate::ClusterCasters) does for maps, and
 /// with the same [bias](crate::ClusterCasters::bias).
 #[derive(Debug)]
 pub struct PageCasters {
-    opaque: MeshCasters,
-    masked: MeshCasters,
+    /// Without and with masks, for triangles inside their pages and for others.
+    inside: [MeshCasters; 2],
+    across: [MeshCasters; 2],
     selection: ClusterSelection,
+    /// Finds the triangles of chosen clusters that pages show.
+    triangles: ComputePipeline,
     share: f32,
     caster_batches: u32,
 }
@@ -40,15 +47,20 @@ impl PageCasters {
             });
         };
         let (support, filter) = (shadows.support(), &shadows.options().filter);
-        let casters = |kind| {
-            let is_masked = kind == MeshKind::Masked;
-            let text = wgsl::page_caster(support, filter, geometry.layout, is_masked);
-            MeshCasters::of_pages(device, shadows, kind, text, Pages::draw_layout(pages), geometry)
+        let casters = |are_inside| {
+            [MeshKind::Opaque, MeshKind::Masked].map(|kind| {
+                let is_masked = kind == MeshKind::Masked;
+                let text =
+                    wgsl::page_caster(support, filter, geometry.layout, is_masked, are_inside);
+                let layout = Pages::draw_layout(pages);
+                MeshCasters::of_pages(device, shadows, kind, text, are_inside, layout, geometry)
+            })
         };
         Ok(Self {
-            opaque: casters(MeshKind::Opaque),
-            masked: casters(MeshKind::Masked),
+            inside: casters(true),
+            across: casters(false),
             selection: ClusterSelection::new(device, support, geometry),
+            triangles: triangles_pipeline(device, filter, geometry),
             share,
             caster_batches: geometry.caster_batches,
         })
@@ -72,7 +84,8 @@ impl PageCasters {
         timestamps: Option<ComputePassTimestampWrites<'_>>,
     ) -> Result<(), Error> {
         let to = (device, queue, encoder);
-        self.selection.encode_pages(to, geometry, views, render_origin, shown, timestamps)
+        let pages = ForPages { shown, triangles: &self.triangles };
+        self.selection.encode_pages(to, geometry, views, render_origin, &pages, timestamps)
     }
 
     /// Draws what was chosen, into a pass whose pages are bound. Returns the number of draws.
@@ -81,13 +94,16 @@ impl PageCasters {
         pass: &mut RenderPass<'_>,
         mask_of: impl Fn(u32) -> Option<&'a BindGroup>,
     ) -> u32 {
-        let batches = 0..self.caster_batches;
-        self.selection.draw_batches(pass, [&self.opaque, &self.masked], batches, mask_of)
+        let count = self.caster_batches;
+        let inside = self.selection.draw_batches(pass, self.inside.each_ref(), 0..count, &mask_of);
+        let of_batch = |draw| mask_of(draw - count);
+        let across = count..2 * count;
+        inside + self.selection.draw_batches(pass, self.across.each_ref(), across, of_batch)
     }
 
     /// The bind group of a mask.
     pub fn mask(&self, device: &Device, queue: &Queue, mask: &Mask<'_>) -> Option<BindGroup> {
-        self.masked.mask(device, queue, mask)
+        self.inside[1].mask(device, queue, mask)
     }
 
     /// What was chosen last, as far as the device has told; `None` while the last choice is under

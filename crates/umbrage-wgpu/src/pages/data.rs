@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use umbrage::paged::{PAGE_TEXELS, Paging};
+use umbrage::paged::{FALLBACK_LEVELS, PAGE_TEXELS, Paging};
 use umbrage::{Aabb, Camera, ShadowMap, ViewRay};
 
 /// `ShadowPageLevel`.
@@ -18,7 +18,10 @@ pub(crate) struct Level {
     pub(crate) slabs: u32,
     pub(crate) slab: i32,
     pub(crate) is_second: u32,
+    pub(crate) coarser: u32,
+    pub(crate) coarser_by: u32,
     pub(crate) padding: u32,
+    pub(crate) to_coarser: [i32; 2],
 }
 
 /// `ShadowPlacedPage`.
@@ -60,6 +63,8 @@ pub(crate) struct Frame {
     pub(crate) are_all_stale: u32,
     pub(crate) maps: u32,
     pub(crate) groups: [u32; 2],
+    pub(crate) stamp: u32,
+    pub(crate) padding: u32,
 }
 
 /// `ShadowPageView`.
@@ -111,6 +116,11 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
             let slabs = grid.slabs as i64;
             let slab_of_level = offset as i64 % slabs;
             let words = own.side * own.side;
+            // Slabs are as many times as thick on a coarser level as its texels are wide.
+            let by = i64::from(FALLBACK_LEVELS.min(grid.last_level() - own.level));
+            let coarser_first = map - slab_of_level as usize + (by * slabs) as usize;
+            let is_behind = (own.slab >> by) > paging.levels[coarser_first].slab;
+            let coarser = (coarser_first + usize::from(is_behind && slabs > 1)) as u32;
             // The windows of neighbouring slabs take turns, so that a slab keeps its place in the
             // table when it becomes the first one.
             let turn = own.slab.rem_euclid(slabs) as u32;
@@ -123,7 +133,13 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
                 slabs: slabs as u32,
                 slab: own.slab as i32,
                 is_second: slab_of_level as u32,
+                coarser: if by == 0 { EMPTY } else { coarser },
+                coarser_by: by as u32,
                 padding: 0,
+                to_coarser: std::array::from_fn(|axis| {
+                    let first = |map: usize| paging.levels[map].first_page[axis];
+                    (first(map) - (first(coarser as usize) << by)) as i32
+                }),
             });
             if slab_of_level == slabs - 1 {
                 table += slabs as u32 * words;

@@ -17,15 +17,18 @@ use wgpu::{
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CommandEncoder, CompareFunction, ComputePassDescriptor,
     ComputePassTimestampWrites, ComputePipeline, ComputePipelineDescriptor, Device, LoadOp,
-    MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PollType,
-    PrimitiveState, Queue, RenderPass, RenderPassTimestampWrites, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    MultisampleState, PipelineCompilationOptions, PipelineLayout, PipelineLayoutDescriptor,
+    PollType, PrimitiveState, Queue, RenderPass, RenderPassTimestampWrites, RenderPipeline,
+    RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
     TextureSampleType, TextureView, TextureViewDimension, VertexState,
 };
 
 /// The most times that pages are listed in a frame, `SHADOW_PAGE_ATTEMPTS` of
 /// `wgsl/page_allocate.wesl`.
 const ATTEMPTS: u32 = 6;
+
+/// Pixels across what a workgroup of `wgsl/page_request.wesl` looks at.
+const REQUEST_SIDE: u32 = 32;
 
 /// Stamps of a frame: one for each attempt, and some to spare.
 const STAMPS: u32 = 8;
@@ -385,7 +388,7 @@ impl Shadows {
         pages.frame = pages.frame.wrapping_add(1);
         let is_multisampled = depth.texture().sample_count() > 1;
         pages.is_multisampled = is_multisampled;
-        pages.workgroups = paging.camera.image().map(|n| n.div_ceil(8));
+        pages.workgroups = paging.camera.image().map(|n| n.div_ceil(REQUEST_SIDE));
         let Pages { held: Some(held), uniforms, pipelines, seen, .. } = pages else { return };
         held.pending = Pending {
             number: 0,
@@ -404,12 +407,14 @@ impl Shadows {
             are_all_stale: (casters == Casters::Moved).into(),
             maps: plan.maps.len() as u32,
             groups: pages.workgroups,
+            stamp: STAMPS.wrapping_mul(pages.frame),
+            padding: 0,
         };
         let view = data::View {
             base: projection.base as f32,
             per_nearness: projection.per_nearness as f32,
             background: if projection.per_nearness > 0.0 { 0.0 } else { 1.0 },
-            frame: STAMPS.wrapping_mul(pages.frame),
+            frame: shared.stamp,
             room: held.room,
             ..data::View::new(&paging.camera, render_origin)
         };
@@ -509,6 +514,7 @@ impl Pages {
             &held.calls,
             &held.boxes,
             &held.shown,
+            &held.stamps,
         ];
         let of_draw = [&self.uniforms.pool, &held.fresh, maps];
         self.groups = Some(Groups {
@@ -538,6 +544,53 @@ fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> Bind
         layout,
         entries: &entries.collect::<Vec<_>>(),
     })
+}
+
+fn module(device: &Device, text: String) -> ShaderModule {
+    device.create_shader_module(ShaderModuleDescriptor {
+        label: Some("shadow pages"),
+        source: ShaderSource::Wgsl(text.into()),
+    })
+}
+
+fn pipeline_layout(device: &Device, layouts: &[Option<&BindGroupLayout>]) -> PipelineLayout {
+    device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some("shadow pages"),
+        bind_group_layouts: layouts,
+        immediate_size: 0,
+    })
+}
+
+fn compute(
+    device: &Device,
+    module: &ShaderModule,
+    layouts: &[Option<&BindGroupLayout>],
+    entry_point: &str,
+) -> ComputePipeline {
+    // All shaders write what they read from the memory of their workgroups.
+    let compilation_options = PipelineCompilationOptions {
+        zero_initialize_workgroup_memory: false,
+        ..PipelineCompilationOptions::default()
+    };
+    device.create_compute_pipeline(&ComputePipelineDescriptor {
+        label: Some("shadow pages"),
+        layout: Some(&pipeline_layout(device, layouts)),
+        module,
+        entry_point: Some(entry_point),
+        compilation_options,
+        cache: None,
+    })
+}
+
+/// The pipeline that finds the triangles of clusters that pages show.
+pub(crate) fn triangles_pipeline(
+    device: &Device,
+    filter: &Filter,
+    geometry: &ClusterGeometry,
+) -> ComputePipeline {
+    let layouts = [Some(&geometry.pipelines.triangles_layout)];
+    let module = module(device, wgsl::page_triangles(filter));
+    compute(device, &module, &layouts, "shadow_page_triangles")
 }
 
 impl Pipelines {
@@ -575,33 +628,14 @@ impl Pipelines {
             layout(ShaderStages::COMPUTE, &[&[depths][..], &others].concat())
         });
         let of_allocation = [
-            UNIFORM, WRITTEN, READ, WRITTEN, READ, WRITTEN, WRITTEN, WRITTEN, WRITTEN, READ,
-            WRITTEN,
+            UNIFORM, WRITTEN, READ, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, READ,
+            WRITTEN, WRITTEN,
         ];
         let allocate_layout = layout(ShaderStages::COMPUTE, &of_allocation.map(of_buffer));
         let draw_layout = layout(ShaderStages::VERTEX, &[UNIFORM, READ, READ].map(of_buffer));
-        let module = |text: String| {
-            device.create_shader_module(ShaderModuleDescriptor {
-                label: Some("shadow pages"),
-                source: ShaderSource::Wgsl(text.into()),
-            })
-        };
-        let pipeline_layout = |layouts: &[Option<&BindGroupLayout>]| {
-            device.create_pipeline_layout(&PipelineLayoutDescriptor {
-                label: Some("shadow pages"),
-                bind_group_layouts: layouts,
-                immediate_size: 0,
-            })
-        };
+        let module = |text: String| module(device, text);
         let compute = |module: &_, layouts: &[Option<&BindGroupLayout>], entry_point| {
-            device.create_compute_pipeline(&ComputePipelineDescriptor {
-                label: Some("shadow pages"),
-                layout: Some(&pipeline_layout(layouts)),
-                module,
-                entry_point: Some(entry_point),
-                compilation_options: PipelineCompilationOptions::default(),
-                cache: None,
-            })
+            compute(device, module, layouts, entry_point)
         };
         let requests = [false, true].map(|is_multisampled| {
             let module = module(wgsl::page_request(filter, is_multisampled));
@@ -615,7 +649,7 @@ impl Pipelines {
             allocate: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_allocate"),
             clear: device.create_render_pipeline(&RenderPipelineDescriptor {
                 label: Some("shadow pages"),
-                layout: Some(&pipeline_layout(&[Some(&draw_layout)])),
+                layout: Some(&pipeline_layout(device, &[Some(&draw_layout)])),
                 vertex: VertexState {
                     module: &clearing,
                     entry_point: Some("shadow_page_clear_vertex"),

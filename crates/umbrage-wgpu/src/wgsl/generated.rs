@@ -417,7 +417,7 @@ fn shadow_outputs({parameters}) -> ShadowPrefiltered {{
 /// `page_sides` for devices that clip at the sides of a page. WESL does not know such outputs, so
 /// the package has the module for other devices alone.
 pub(super) fn clipped_page_sides() -> Module {
-    let discards = include_str!("page_sides.wesl");
+    let discards = include_str!("page_sides/discarded.wesl");
     let clip = "    @builtin(position) clip: vec4f,\n";
     let sides = "    @builtin(clip_distances) sides: array<f32, 4>,\n";
     let (declared, _) = discards.split_once("// Whether a fragment").unwrap_or((discards, ""));
@@ -441,5 +441,5 @@ fn shadow_page_is_beside(texel: vec3f) -> bool {{
 }}
 "
     );
-    Module { path: "page_sides", text: text.into() }
+    Module { path: "page_sides/clipped", text: text.into() }
 }

@@ -163,7 +163,9 @@ fn every_other_module_is_valid() {
             for is_masked in [true, false] {
                 validated(&cluster_caster(&support, layout, is_masked));
                 for filter in page_filters() {
-                    validated(&page_caster(&support, &filter, layout, is_masked));
+                    for are_inside in [false, true] {
+                        validated(&page_caster(&support, &filter, layout, is_masked, are_inside));
+                    }
                 }
             }
             validated(&cluster_vertex(3, layout));
@@ -174,6 +176,7 @@ fn every_other_module_is_valid() {
             validated(&page_request(&filter, is_multisampled));
         }
         validated(&page_clear(&filter, &Support::FULL));
+        validated(&page_triangles(&filter));
     }
     for text in [
         page_allocate(),
@@ -350,7 +353,7 @@ fn structs_of_clusters_are_laid_out_alike() {
             of("ShadowClusterItem", offsets!(ours::Item, [view, instance, node])),
             of(
                 "ShadowClusterChoice",
-                offsets!(ours::Choice, [instance, cluster, draw, first, block, page]),
+                offsets!(ours::Choice, [instance, cluster, draw, first, block, page, rows]),
             ),
             of("ShadowClusterOrigin", offsets!(ours::Origin, [high, low])),
             (
@@ -363,7 +366,10 @@ fn structs_of_clusters_are_laid_out_alike() {
     spans(
         &cluster_draws(),
         &[
-            of("ShadowClusterDrawing", offsets!(ours::Drawing, [draws, spans, choices, triangles])),
+            of(
+                "ShadowClusterDrawing",
+                offsets!(ours::Drawing, [draws, spans, choices, triangles, in_pages]),
+            ),
             of("ShadowClusterSpan", offsets!(ours::Span, [first, count])),
         ],
     );
@@ -376,7 +382,10 @@ fn structs_of_clusters_are_laid_out_alike() {
     );
     spans(
         &cluster_indices(),
-        &[of("ShadowClusterIndexing", offsets!(ours::Indexing, [choices, triangles, blocks]))],
+        &[of(
+            "ShadowClusterIndexing",
+            offsets!(ours::Indexing, [choices, triangles, blocks, draws]),
+        )],
     );
 }
 
@@ -388,7 +397,10 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPageLevel",
         ours::Level,
-        [first, side, table, level, levels, slabs, slab, is_second]
+        [
+            first, side, table, level, levels, slabs, slab, is_second, coarser, coarser_by,
+            to_coarser
+        ]
     );
     check_layout!(
         &module,
@@ -401,7 +413,7 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPageFrame",
         ours::Frame,
-        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups]
+        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups, stamp]
     );
     let (module, _) = validated(&page_request(&Filter::Hard, false));
     check_layout!(
@@ -498,9 +510,11 @@ fn shaders() -> Vec<Shader> {
         shaders.extend([true, false].map(caster));
         // WESL does not know how to clip.
         let support = Support { clip_distances: false, ..Support::FULL };
-        let in_pages =
-            |is_masked| page_caster_shader(&support, &Filter::Pcf { n: 3 }, layout, is_masked);
-        shaders.extend([true, false].map(in_pages));
+        let filter = Filter::Pcf { n: 3 };
+        let in_pages = |(is_masked, are_inside)| {
+            page_caster_shader(&support, &filter, layout, is_masked, are_inside)
+        };
+        shaders.extend([(true, true), (true, false), (false, true), (false, false)].map(in_pages));
         shaders.push(cluster_picture_shader(2, layout));
     }
     for is_multisampled in [false, true] {
@@ -508,6 +522,7 @@ fn shaders() -> Vec<Shader> {
     }
     shaders.push(page_allocate_shader());
     shaders.push(page_clear_shader(&Filter::Hard, &Support::FULL));
+    shaders.push(page_triangles_shader(&Filter::Hard));
     shaders.extend([true, false].map(cluster_descent_shader));
     shaders.extend([cluster_draws_shader(), cluster_indices_shader()]);
     shaders.extend([cluster_occluders_shader(), cluster_farther_shader()]);
