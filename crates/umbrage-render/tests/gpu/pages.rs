@@ -179,6 +179,39 @@ fn pages_are_kept() {
     }
 }
 
+/// After a thousand frames, pages that were kept, given up and drawn again show what new ones do.
+#[needs(gpu)]
+#[test]
+fn a_long_walk_keeps_pages_right() {
+    let scene = scene("contacts");
+    let mut set = Set::new(&scene, IMAGE);
+    let light = set.light();
+    // Fewer texels than the walk wants in all, so that places are given to other pages.
+    let technique: Technique = "paged@704".parse().unwrap();
+    let buffers = buffers(&scene);
+    let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+    let mut drawn = 0;
+    let mut cameras = walk(&scene, 1000).enumerate();
+    while let Some((frame, camera)) = cameras.next() {
+        set.camera = camera;
+        let plan = set.plan(&[light], &technique);
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        let counts = renderer.page_counts().unwrap();
+        assert_eq!(counts.missing, 0, "{frame}");
+        drawn += counts.drawn;
+        if frame % 200 == 199 {
+            let mut fresh_plan = plan.clone();
+            fresh_plan.set_page_bias(f64::from(counts.bias));
+            let kept = Drawn::by(&mut renderer, &set.camera, &light);
+            let (fresh, _) = Drawn::of(&set, &fresh_plan, &technique);
+            let differ = kept.differ(&fresh);
+            assert!(differ * 1000 <= fresh.visibility.len(), "{frame}: {differ} differ");
+        }
+    }
+    let room = renderer.page_counts().unwrap().room;
+    assert!(drawn > 2 * room, "{drawn} pages drawn in {room} places");
+}
+
 #[needs(gpu)]
 #[test]
 fn pages_without_what_they_need_are_refused() {

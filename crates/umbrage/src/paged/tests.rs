@@ -172,6 +172,65 @@ proptest! {
     }
 }
 
+/// A frame of a walk: how the viewer turns, and what it looks at.
+fn frame() -> impl Strategy<Value = (f64, [[f64; 3]; 6])> {
+    (-0.03..0.03, prop::array::uniform6(prop::array::uniform3(0.0..1.0)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+
+    /// Over a walk of a thousand frames, whatever page is wanted again is what it was to the bit,
+    /// though the plan's windows have moved on; and no two pages of a window share a place in its
+    /// table, in which pages lie by their indices modulo the window's side.
+    #[test]
+    fn pages_of_a_walk_stay_what_they_were(
+        (place, light) in places().prop_flat_map(|p| (Just(p), light(p))),
+        frames in prop::collection::vec(frame(), 1000),
+    ) {
+        let technique = technique(0.7);
+        let mut planner = Planner::new();
+        let mut kept = std::collections::HashMap::new();
+        let (mut eye, mut turn) = (place, 0.0f64);
+        for (turned, points) in frames {
+            turn += turned;
+            let way = DVec3::new(turn.cos(), -0.2, turn.sin());
+            // A stride at 1.4 m/s and 60 frames a second.
+            eye += way.normalize() * (1.4 / 60.0);
+            let camera = Camera::look_at(LookAt {
+                eye,
+                target: eye + way,
+                up: DVec3::Y,
+                fov_y_rad: 1.0,
+                near: 0.2,
+                far: 300.0,
+                image: [480, 270],
+            })
+            .unwrap();
+            let plan = planner.plan(&camera, &[light], &Bounds::default(), &technique).unwrap();
+            let mut places_in_table = std::collections::HashMap::new();
+            for point in points {
+                let point = seen(&camera, point);
+                let Some(place) = plan.page_place(0, point) else { continue };
+                let map = plan.page_map(&place.page).unwrap();
+                let side = i64::from(plan.paging.as_ref().unwrap().levels[place.map].side);
+                let [i, j] = [place.page.i, place.page.j].map(|index| index.rem_euclid(side));
+                let other = places_in_table.insert((place.map, i, j), place.page);
+                prop_assert!(other.is_none_or(|other| other == place.page));
+                let first: &mut ShadowMap = kept.entry(place.page).or_insert_with(|| map.clone());
+                prop_assert_eq!(first.shadow_from_local, map.shadow_from_local);
+                prop_assert_eq!(first.local_from_shadow, map.local_from_shadow);
+                prop_assert_eq!(
+                    (first.origin, &first.caster_planes),
+                    (map.origin, &map.caster_planes)
+                );
+            }
+        }
+        let is_sun = matches!(light, Light::Directional { .. });
+        prop_assert!(kept.len() > 10 || !is_sun, "{} pages", kept.len());
+    }
+}
+
 /// An even floor seen from above, on which the number of pages follows from its size.
 fn floor() -> (Camera, Vec<DVec3>) {
     let camera = Camera::look_at(LookAt {
