@@ -6,7 +6,7 @@ use crate::planning::milliseconds;
 use crate::receivers::Receivers;
 use crate::strip::Rows;
 use std::time::Instant;
-use umbrage::paged::PAGE_TEXELS;
+use umbrage::paged::PAGE_AREA;
 use umbrage::{Plan, Technique};
 use umbrage_render::{Drawn, FrameTarget, Shading, StageTimes, Timer};
 use umbrage_trace::{Reference, Tracer, View};
@@ -147,9 +147,7 @@ fn frame_on_gpu(
     let bytes = renderer.shadows().lookup_bytes();
     let of_map = |&(map, _): &(usize, Drawn)| plan.maps[map].texels();
     let texels = match renderer.page_counts() {
-        Some(pages) => {
-            [pages.wanted, pages.drawn].map(|n| u64::from(n) * u64::from(PAGE_TEXELS).pow(2))
-        }
+        Some(pages) => [pages.wanted, pages.drawn].map(|n| u64::from(n) * PAGE_AREA),
         None => [plan.texels(), drawn.iter().map(of_map).sum()],
     };
     let of_pages = |ms| Some(ms).filter(|_| plan.paging.is_some() && timer.is_some());
@@ -171,7 +169,7 @@ fn frame_by_reference(tracer: &Tracer<'_>, view: &View<'_>, plan: &Plan) -> Resu
     let bytes = reference.bytes();
     let shade = milliseconds(shaded);
     let texels = match plan.paging {
-        Some(_) => [reference.pages() as u64 * u64::from(PAGE_TEXELS).pow(2); 2],
+        Some(_) => [reference.pages() as u64 * PAGE_AREA; 2],
         None => [plan.texels(); 2],
     };
     Ok(Costs {

@@ -16,7 +16,7 @@ use crate::view::{ChosenView, ViewOptions, choose_view};
 use rayon::prelude::*;
 use std::path::Path;
 use std::time::Instant;
-use umbrage::paged::PAGE_TEXELS;
+use umbrage::paged::PAGE_AREA;
 use umbrage::visibility::LightSize;
 use umbrage::{Plan, ShadowMap};
 use umbrage_measure::{
@@ -379,10 +379,9 @@ impl Contender<'_> {
             write_pictures(folder, index, &shadows, &seen, truth, ErrorScale::default())?;
         let paging = self.plan.paging.as_ref();
         let pages = self.executor.pages().map(|pages| pages as u64);
-        let texels_of_page = u64::from(PAGE_TEXELS).pow(2);
         let metrics = measure(truth.visibility, &picture.visibility, truth.counted, cosine)?;
         let texels = match paging {
-            Some(_) => pages.unwrap_or_default() * texels_of_page,
+            Some(_) => pages.unwrap_or_default() * PAGE_AREA,
             None => self.plan.texels(),
         };
         let measured = Measured {

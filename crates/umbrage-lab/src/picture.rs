@@ -4,7 +4,7 @@ use crate::strip::Strip;
 use glam::Vec3;
 use umbrage::Plan;
 use umbrage::paged::PAGE_TEXELS;
-use umbrage_measure::Rgb;
+use umbrage_measure::{PARTITIONS, Rgb};
 use umbrage_trace::shade;
 
 /// A picture with shadows, whether traced or rendered with shadow maps.
@@ -51,12 +51,12 @@ pub struct SeenPage {
 
 impl Texels {
     /// Returns the number of each pixel's tint: the index of the map that serves it or, in plans
-    /// with pages, that of its level, so that neighbouring levels have different tints.
+    /// with pages, that of the page's level, which is the same in all views.
     pub fn tints(&self, plan: &Plan) -> Vec<Option<u16>> {
-        let is_paged = plan.paging.is_some();
-        let tint = |map: u16| match plan.maps.get(usize::from(map)) {
-            Some(window) if is_paged => window.part.slice as u16,
-            _ => map,
+        let levels = plan.paging.as_ref().map(|paging| &paging.levels);
+        let tint = |map: u16| match levels.and_then(|levels| levels.get(usize::from(map))) {
+            Some(window) => window.level.rem_euclid(PARTITIONS.len() as i32) as u16,
+            None => map,
         };
         self.map.iter().map(|map| map.map(tint)).collect()
     }

@@ -19,6 +19,7 @@ mod overlay;
 mod pages;
 mod pipelines;
 mod points;
+mod pool_picture;
 mod renderer;
 mod samples;
 mod scene;

@@ -34,6 +34,13 @@ pub enum Overlay<'a> {
         /// The colours of the maps, which repeat.
         colors: &'a [[u8; 3]; PARTITION_COLORS],
     },
+    /// The [pages](umbrage::paged) that serve each surface: the picture's lightness, tinted by the
+    /// page's level, with dark borders. Pages are lighter in the half second after they are drawn,
+    /// 30 frames. Surfaces without pages are dimmed.
+    Pages {
+        /// The colours of levels. That of level l has the number l modulo their number.
+        colors: &'a [[u8; 3]; PARTITION_COLORS],
+    },
     /// The clusters of triangles that are drawn: the picture's lightness, tinted by the cluster's
     /// level of detail, and a little darker by its number. Where no clusters are drawn, all
     /// surfaces have level 0.
@@ -43,7 +50,7 @@ pub enum Overlay<'a> {
     },
 }
 
-/// Number of colours for maps, after which they repeat, as in `wgsl/overlay.wgsl`.
+/// Number of colours for maps and for levels of pages, after which they repeat, as in `wgsl/overlay.wgsl`.
 pub const PARTITION_COLORS: usize = 7;
 
 /// Number of colours for levels of detail, as in `wgsl/overlay.wgsl`.
@@ -67,6 +74,7 @@ impl OverlayUniform {
             Overlay::Grid { color } => (1, std::slice::from_ref(color), f32::MAX),
             Overlay::Partition { colors } => (2, colors.as_slice(), f32::MAX),
             Overlay::Clusters { colors } => (3, colors.as_slice(), f32::MAX),
+            Overlay::Pages { colors } => (4, colors.as_slice(), f32::MAX),
         };
         if matches!(overlay, Overlay::Error { .. }) && !(max > 1.0 && max <= 1e6) {
             return Err(Error::Invalid {

@@ -6,6 +6,7 @@ use crate::overlay::OverlayUniform;
 use crate::pages::PageDrawing;
 use crate::pipelines::{PipelineParts, Pipelines};
 use crate::points::Points;
+use crate::pool_picture::PoolPicture;
 use crate::scene::SceneBuffers;
 use crate::timer::{Stage, Timer};
 use crate::view::{Tile, ViewUniform};
@@ -37,6 +38,7 @@ pub struct Renderer<'g> {
     pub(crate) shadows: Shadows,
     pub(crate) points: Option<Points>,
     pub(crate) map_picture: Option<MapPicture>,
+    pub(crate) pool_picture: Option<PoolPicture>,
     opaque: MeshCasters,
     masked: MeshCasters,
     /// One for each material; `None` for opaque materials.
@@ -192,6 +194,7 @@ impl<'g> Renderer<'g> {
             shadows,
             points: None,
             map_picture: None,
+            pool_picture: None,
             opaque,
             masked,
             masks,

@@ -97,16 +97,22 @@ pub(crate) enum OverlayKind {
     Partition,
     Difference,
     Clusters,
+    Pages,
 }
 
 impl OverlayKind {
-    pub(crate) const ALL: [(Self, &'static str, &'static str); 6] = [
+    pub(crate) const ALL: [(Self, &'static str, &'static str); 7] = [
         (Self::None, "none", "Show the plain pictures."),
         (Self::Error, "error", "Show how many pixels wide a texel is: above 1, edges are jagged."),
         (Self::Texels, "texels", "Show every fifth line of the texels' grid on the surfaces."),
         (Self::Partition, "partition", "Tint each surface by the map that serves it."),
         (Self::Difference, "difference", "Show false light and false shadow, once the view rests."),
         (Self::Clusters, "clusters", "Tint the clusters of triangles by their level of detail."),
+        (
+            Self::Pages,
+            "pages",
+            "Tint the pages of paged maps by their level; new ones are lighter.",
+        ),
     ];
 
     /// Why a scene cannot be shown so, if it cannot.
@@ -124,6 +130,7 @@ impl OverlayKind {
             Self::Texels => Some(Overlay::Texels),
             Self::Partition => Some(Overlay::Partition),
             Self::Clusters => Some(Overlay::Clusters),
+            Self::Pages => Some(Overlay::Pages),
         }
     }
 }

@@ -60,6 +60,9 @@ use std::ops::Range;
 /// Texels across a page.
 pub const PAGE_TEXELS: u32 = 64;
 
+/// Texels of a page.
+pub const PAGE_AREA: u64 = PAGE_TEXELS as u64 * PAGE_TEXELS as u64;
+
 /// The thickness of a slab under parallel light, texels of the page's level.
 pub const SLAB_TEXELS: f64 = 65536.0;
 
@@ -165,8 +168,9 @@ fn floor_log2(x: f64) -> i32 {
     (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
 }
 
-/// The width of a texel of a level.
-pub(crate) fn texel_width(level: i32) -> f64 {
+/// The width of a texel of a level: metres under parallel light, and metres at a distance of one
+/// metre along the axis of a lamp's map.
+pub fn texel_width(level: i32) -> f64 {
     f64::from(level).exp2()
 }
 

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use umbrage::paged::{Level, PAGE_TEXELS, Page, Paging};
+use umbrage::paged::{Level, PAGE_AREA, PAGE_TEXELS, Page, Paging};
 use umbrage::{Plan, ShadowMap};
 use umbrage_lab::{ChosenLight, ChosenView, NamedTechnique};
 use umbrage_measure::View;
@@ -236,5 +236,5 @@ fn texel(level: &Level, window: &ShadowMap) -> Texel {
 }
 
 fn texels_of(pages: usize) -> u64 {
-    pages as u64 * u64::from(PAGE_TEXELS).pow(2)
+    pages as u64 * PAGE_AREA
 }

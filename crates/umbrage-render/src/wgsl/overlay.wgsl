@@ -3,7 +3,7 @@
 // of reports are.
 
 struct Overlay {
-    // ERROR, GRID, PARTITION or CLUSTERS.
+    // ERROR, GRID, PARTITION, CLUSTERS or PAGES.
     kind: u32,
     // Logarithm of the upper end of the scale of errors, pixels per texel.
     log_max: f32,
@@ -18,8 +18,12 @@ const ERROR: u32 = 0u;
 const GRID: u32 = 1u;
 const PARTITION: u32 = 2u;
 const CLUSTERS: u32 = 3u;
+const PAGES: u32 = 4u;
 const PARTITION_COLORS: u32 = 7u;
 const LEVEL_COLORS: u32 = 16u;
+// Texels across a page, and how many frames long it is told that a page was drawn.
+const PAGE_TEXELS: f32 = 64.0;
+const NEW_FRAMES: f32 = 30.0;
 
 @group(0) @binding(1) var<uniform> overlay: Overlay;
 
@@ -57,7 +61,18 @@ fn overlaid(in: Fragment, s: Surface) -> vec4f {
         return shown(dimmed(picture));
     }
     if (overlay.kind == GRID) {
-        return shown(mix(0.6 * picture, overlay.colors[0].rgb, grid_cover(spread)));
+        return shown(mix(0.6 * picture, overlay.colors[0].rgb, grid_cover(spread, 5.0, 0.3)));
+    }
+    if (overlay.kind == PAGES) {
+        let seen = shadow_page_seen(view.light_index, s.position);
+        if (seen.x == 0) {
+            return shown(dimmed(picture));
+        }
+        let count = i32(PARTITION_COLORS);
+        let level = overlay.colors[(seen.y % count + count) % count].rgb;
+        let newness = clamp(1.0 - f32(seen.z) / NEW_FRAMES, 0.0, 1.0);
+        let color = tinted(mix(level, vec3f(1.0), 0.7 * newness), picture);
+        return shown(mix(color, vec3f(0.0), 0.75 * grid_cover(spread, PAGE_TEXELS, 0.0)));
     }
     let map = shadow_maps[spread.place.map].index;
     return shown(tinted(overlay.colors[map % PARTITION_COLORS].rgb, picture));
@@ -103,12 +118,10 @@ fn hatch(at: vec4f) -> vec3f {
     return vec3f(select(160.0, 90.0, stripe % 2u == 0u) / 255.0);
 }
 
-// How much of a pixel lines cover that lie at every fifth texel in s and in t. Where they would be
-// too dense to see, they fade into a uniform tint.
-fn grid_cover(spread: TexelSpread) -> f32 {
-    let period = 5.0;
+// How much of a pixel lines cover that lie a number of texels apart in s and in t. Where they would
+// be too dense to see, they fade into a uniform tint.
+fn grid_cover(spread: TexelSpread, period: f32, tint: f32) -> f32 {
     let width_px = 1.2;
-    let tint = 0.3;
     // Periods per pixel, along s and along t.
     let density = sqrt(spread.right * spread.right + spread.down * spread.down) / period;
     let phase = spread.place.texel / period;

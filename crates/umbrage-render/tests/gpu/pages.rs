@@ -5,7 +5,8 @@ use crate::{GPU, Set, mesh_inputs, scene};
 use glam::DVec3;
 use umbrage::{Aabb, Camera, Light, Plan, Technique};
 use umbrage_clusters::build_finest;
-use umbrage_render::{Renderer, SceneBuffers, Shading};
+use umbrage_measure::PARTITIONS;
+use umbrage_render::{FrameTarget, Overlay, Renderer, SceneBuffers, Shading};
 use umbrage_scene::{Lens, Scene};
 use umbrage_testing::needs;
 use umbrage_trace::View;
@@ -44,6 +45,45 @@ fn lamps_have_pages() {
     view.near = -0.1 * view.eye.distance(view.target);
     set.camera = view.camera(IMAGE).unwrap();
     agrees_with_lights("lantern", &set, &lights, &technique);
+}
+
+/// Under a sun, a cone, a wide cone and the scene's own light or a second sun.
+fn agrees_under_four_lights(names: &[&str]) {
+    let technique: Technique = "paged".parse().unwrap();
+    for name in names {
+        let scene = scene(name);
+        let set = Set::new(&scene, IMAGE);
+        agrees_with_lights(name, &set, &four_lights(&set), &technique);
+    }
+}
+
+#[needs(gpu)]
+#[test]
+fn all_built_in_scenes_have_pages_under_four_lights() {
+    agrees_under_four_lights(&[
+        "town:4",
+        "airfield:4",
+        "statues:2",
+        "colossus:1",
+        "grove:12",
+        "fence:2",
+        "lamps:2",
+        "contacts",
+        "pole",
+        "slit",
+        "sphere",
+    ]);
+}
+
+#[needs(gpu, scenes)]
+#[test]
+fn third_party_scenes_have_pages_under_four_lights() {
+    agrees_under_four_lights(&[
+        "lattice/fence_rows.glb",
+        "trees/forest_eztree.glb",
+        "atrium/sponza_atrium_reduced.glb",
+        "city/delft_city.glb",
+    ]);
 }
 
 #[needs(gpu)]
@@ -210,6 +250,65 @@ fn a_long_walk_keeps_pages_right() {
     }
     let room = renderer.page_counts().unwrap().room;
     assert!(drawn > 2 * room, "{drawn} pages drawn in {room} places");
+}
+
+/// The overlay shows levels and borders, and for a while which pages are new; the pool's picture has
+/// a square for each page.
+#[needs(gpu)]
+#[test]
+fn pages_are_shown() {
+    let scene = scene("town:4");
+    let set = Set::new(&scene, IMAGE);
+    let light = set.light();
+    let technique: Technique = "paged@1024".parse().unwrap();
+    let plan = set.plan(&[light], &technique);
+    let buffers = buffers(&scene);
+    let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+    let grid = &plan.paging.as_ref().unwrap().grids[0];
+    let pool = FrameTarget::new(&GPU, [512; 2]).unwrap();
+    assert!(renderer.show_pool(grid, &PARTITIONS, &pool).is_err(), "nothing was drawn");
+    renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+    let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+    let target = FrameTarget::new(&GPU, IMAGE).unwrap();
+    let overlay = Overlay::Pages { colors: &PARTITIONS };
+    let mut shown = |renderer: &mut Renderer<'_>| {
+        renderer.frame_with(&overlay, &shading, &target, None).unwrap();
+        renderer.show_pool(grid, &PARTITIONS, &pool).unwrap();
+        [target.read(&GPU).unwrap(), pool.read(&GPU).unwrap()]
+    };
+    let lightness = |picture: &[[u8; 4]]| {
+        picture.iter().flatten().map(|&v| u64::from(v)).sum::<u64>() / picture.len() as u64
+    };
+    let new = shown(&mut renderer);
+    for _ in 0..30 {
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+    }
+    let old = shown(&mut renderer);
+    for (new, old) in new.iter().zip(&old) {
+        assert!(lightness(new) > lightness(old) + 10, "new pages are lighter");
+    }
+    // As many squares as there are places are empty as pages are missing to that.
+    let counts = renderer.page_counts().unwrap();
+    let empty = [18, 26, 51, 255];
+    let middle = |i: u32| (32 * (i / 16) + 16) * 512 + 32 * (i % 16) + 16;
+    let free = (0..256).filter(|&i| old[1][middle(i) as usize] == empty).count();
+    assert_eq!(free as u32, counts.room - counts.wanted);
+    // Each surface has the tint of its level, whatever the shading.
+    let band = View::new(&set.tracer, set.camera, light, 1).unwrap();
+    let band = band.band(0..IMAGE[1], &|_| {});
+    let mut wrong = 0;
+    let mut told = 0;
+    for (pixel, sample) in old[0].iter().zip(band.samples()) {
+        let Some(sample) = sample else { continue };
+        let Some(place) = plan.page_place(0, sample.surface.position) else { continue };
+        let [r, g, b] = PARTITIONS[place.page.level.rem_euclid(7) as usize].map(f64::from);
+        let [x, y, z] = [pixel[0], pixel[1], pixel[2]].map(f64::from);
+        told += 1;
+        // Black lines and shading scale all three.
+        let off = (x * g - y * r).abs() + (y * b - z * g).abs();
+        wrong += u32::from(off > 0.05 * (r + g + b) * (x + y + z).max(30.0));
+    }
+    assert!(told > 10_000 && wrong * 50 < told, "{wrong} of {told} tints");
 }
 
 #[needs(gpu)]

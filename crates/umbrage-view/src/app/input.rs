@@ -31,7 +31,7 @@ pub(super) const KEYS: &[(&str, &str)] = &[
     ("W A S D Q E", "walk; with shift faster"),
     ("arrows", "turn, while the picture has the focus (Tab)"),
     ("shift and arrows", "move the sun, likewise"),
-    ("1 … 6", "overlays: none, error, texels, partition, difference, clusters"),
+    ("1 … 7", "overlays: none, error, texels, partition, difference, clusters, pages"),
     ("O / C", "next overlay / next way to compare"),
     ("X / hold B", "swap the two techniques / the second while flipping"),
     ("V", "orbit or fly"),
@@ -206,6 +206,7 @@ impl App<'_> {
             Key::Num4 => overlay(3),
             Key::Num5 => overlay(4),
             Key::Num6 => overlay(5),
+            Key::Num7 => overlay(6),
             Key::O => {
                 let info = self.info.as_ref();
                 let is_shown = |kind: &OverlayKind| info.is_none_or(|i| kind.refusal(i).is_none());

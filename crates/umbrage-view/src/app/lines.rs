@@ -4,6 +4,7 @@ use crate::settings::OverlayKind;
 use crate::stage::{DrawnPicture, Frame};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, vec2};
 use glam::{DVec2, DVec3};
+use umbrage::paged::texel_width;
 use umbrage::{Camera, Plan, ShadowMap};
 use umbrage_measure::{
     ErrorScale, FALSE_LIGHT, FALSE_SHADOW, LEVELS, PARTITIONS, Rgb, level_scale,
@@ -185,12 +186,37 @@ pub(super) fn paint_legend(painter: &Painter, rect: Rect, overlay: OverlayKind, 
             let maps = plan.maps.iter().enumerate().filter(|(_, map)| !map.is_empty());
             maps.map(|(i, map)| (map_color(i), map_name(map))).take(12).collect()
         }
+        OverlayKind::Pages => levels_of_pages(plan),
         OverlayKind::Difference => vec![
             (color(FALSE_LIGHT), "lit, should be dark".into()),
             (color(FALSE_SHADOW), "dark, should be lit".into()),
         ],
     };
     paint_rows(painter, rect, &rows);
+}
+
+/// The colours of the levels of pages, with the widths of their texels.
+fn levels_of_pages(plan: &Plan) -> Vec<(Color32, String)> {
+    let Some(grid) = plan.paging.as_ref().and_then(|paging| paging.grids.first()) else {
+        return vec![(Color32::GRAY, "only paged maps have pages".into())];
+    };
+    let is_sun = plan.maps.first().is_some_and(|map| map.apex.is_none());
+    // Under a lamp, the width a metre away from it.
+    let unit = if is_sun { "m" } else { "m per m" };
+    let count = PARTITIONS.len() as i32;
+    let row = |i: i32| {
+        let levels = (grid.first_level..=grid.last_level()).rev();
+        let of_color = levels.filter(|level| level.rem_euclid(count) == i);
+        let widths: Vec<_> = of_color.map(|level| short(texel_width(level))).collect();
+        (map_color(i as usize), format!("texels of {} {unit}", widths.join(", ")))
+    };
+    (0..count).map(row).collect()
+}
+
+/// A number with two digits that tell something.
+fn short(x: f64) -> String {
+    let decimals = (1.0 - x.log10().floor()).max(0.0) as usize;
+    format!("{x:.decimals$}")
 }
 
 /// Draws rows of a colour with its meaning into the lower left corner of a rectangle.

@@ -11,6 +11,7 @@ use crate::stage::{Costs, Job};
 use egui::{Color32, ComboBox, Grid, Pos2, Rect, RichText, Sense, Stroke, Ui, Window, vec2};
 use egui_plot::{Legend, Line, Plot, PlotPoints, Points, VLine};
 use glam::DVec2;
+use umbrage::paged::Paging;
 use umbrage::{Camera, Light, Plan};
 use umbrage_lab::{NamedTechnique, PRESETS};
 
@@ -68,6 +69,12 @@ impl App<'_> {
             };
             let ms = |ms: Option<f64>| ms.map_or("–".into(), |ms| format!("{ms:.2} ms"));
             row("plan", "Time of planning on the CPU.", &|c| ms(Some(c.plan_ms)));
+            row("prepass", "Time to draw the viewer's depths ahead of pages, on the GPU.", &|c| {
+                ms(c.prepass_ms)
+            });
+            row("pages", "Time to find pages, and what casts into new ones, on the GPU.", &|c| {
+                ms(c.pages_ms)
+            });
             row("depth", "Time to draw casters into the maps, on the GPU.", &|c| ms(c.depth_ms));
             row("filter", "Time to prefilter the maps, on the GPU.", &|c| ms(c.filter_ms));
             row("picture", "Time to draw the picture with lookups, on the GPU.", &|c| {
@@ -97,8 +104,9 @@ impl App<'_> {
             ui.label("This device measures no times of its stages; planning alone is shown.");
         }
         type Stage = (&'static str, Color32, fn(&Costs) -> f64);
-        let stages: [Stage; 4] = [
+        let stages: [Stage; 5] = [
             ("plan", Color32::from_rgb(240, 228, 66), |c| c.plan_ms),
+            ("pages", Color32::from_rgb(204, 121, 167), |c| c.pages_ms.unwrap_or(0.0)),
             ("depth", Color32::from_rgb(86, 180, 233), |c| c.depth_ms.unwrap_or(0.0)),
             ("filter", Color32::from_rgb(0, 158, 115), |c| c.filter_ms.unwrap_or(0.0)),
             ("lookup", Color32::from_rgb(213, 94, 0), |c| c.lookup_ms.unwrap_or(0.0)),
@@ -262,6 +270,9 @@ impl App<'_> {
     fn map(&mut self, ui: &mut Ui) {
         let Some(frame) = self.frame.clone() else { return };
         let Some(drawn) = drawn(&frame, 0) else { return };
+        if let Some(paging) = &drawn.plan.paging {
+            return self.pool(ui, paging);
+        }
         let maps = &drawn.plan.maps;
         let mut chosen = self.kept.shown.map.min(maps.len().saturating_sub(1));
         let name = |i: usize| format!("{}: {}", i + 1, map_name(&maps[i]));
@@ -295,6 +306,25 @@ impl App<'_> {
         paint(ui.painter(), rect, shown.id);
         let planned_for = frame.request.planned_for.unwrap_or(frame.request.camera);
         paint_in_map(ui.painter(), rect, map, &planned_for);
+    }
+
+    /// The texture in which pages lie.
+    fn pool(&self, ui: &mut Ui, paging: &Paging) {
+        let Some(shown) = self.textures.map() else { return };
+        ui.label(match paging.budget {
+            Some(places) => {
+                format!("{} places for pages of 64×64 texels", thousands(places.into()))
+            }
+            None => "as many places for pages of 64×64 texels as the view needs".to_owned(),
+        });
+        let [w, h] = shown.size().map(|n| n as f32);
+        let most = (ui.available_width() / w).min(380.0 / h);
+        let (rect, response) = ui.allocate_exact_size(vec2(w * most, h * most), Sense::hover());
+        response.on_hover_text(
+            "The texture of pages: tinted by level, what is nearer to the light is lighter. New \
+             pages are lighter, those that are not wanted any more dim, free places dark blue.",
+        );
+        paint(ui.painter(), rect, shown.id);
     }
 
     /// View, receivers and warps as the light sees them.

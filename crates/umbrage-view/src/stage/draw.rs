@@ -9,12 +9,14 @@ use super::{News, Reporter};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+use umbrage::paged::{Grid, PAGE_AREA};
 use umbrage::visibility::Filter;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, SeenTiles};
 use umbrage_lab::{
     Error, Fit, NamedTechnique, PreparedScene, Receivers, Scout, edge_on, fade, make_pages,
     milliseconds, plan_with, planner, shadow_options, unfit_for_gpu,
 };
+use umbrage_measure::PARTITIONS;
 use umbrage_render::{FrameTarget, Gpu, Renderer, SceneBuffers, Shading, StageTimes, Timer};
 use umbrage_trace::Tracer;
 use umbrage_wgpu::{Casters, ShadowOptions};
@@ -58,6 +60,8 @@ struct Easel<'a> {
     targets: Targets,
     timer: Option<Timer>,
     times: Option<StageTimes>,
+    /// A grid of the plan that was drawn last, if that has pages.
+    grid: Option<Grid>,
 }
 
 /// A renderer for techniques with these options.
@@ -255,6 +259,7 @@ impl<'a> Artist<'a> {
         let start = Instant::now();
         let plan = easel.plan(technique, planned_for, light, &bounds).map_err(|e| e.to_string())?;
         let plan_ms = milliseconds(start);
+        easel.grid = plan.paging.as_ref().and_then(|paging| paging.grids.first().cloned());
         let target = easel.targets.free(gpu, request.camera.image())?;
         make_pages(gpu, buffers, tracer.scene(), technique.technique())
             .map_err(|e| e.to_string())?;
@@ -281,7 +286,10 @@ impl<'a> Artist<'a> {
         let picture = picture.map_err(text)?;
         let costs = Costs {
             plan_ms,
-            texels: plan.texels(),
+            texels: match renderer.page_counts() {
+                Some(pages) => u64::from(pages.wanted) * PAGE_AREA,
+                None => plan.texels(),
+            },
             bytes: renderer.shadows().lookup_bytes(),
             map_draws: maps.iter().map(|(_, drawn)| drawn.draws).sum(),
             map_triangles: maps.iter().map(|(_, drawn)| drawn.triangles).sum(),
@@ -312,11 +320,18 @@ impl<'a> Artist<'a> {
         let gpu = self.gpu;
         let easel = self.easels.first_mut()?;
         let renderer = &mut easel.renderers.last_mut()?.renderer;
-        let [width, height] = renderer.shadows().place(map)?.size;
+        let pool = easel.grid.as_ref().zip(renderer.pool_size());
+        let [width, height] = match pool {
+            Some((_, size)) => size,
+            None => renderer.shadows().place(map)?.size,
+        };
         let most = width.max(height).div_ceil(MAP_SIDE);
         let target =
             self.map_targets.free(gpu, [width.div_ceil(most), height.div_ceil(most)]).ok()?;
-        renderer.show_map(map, &target).ok()?;
+        match pool {
+            Some((grid, _)) => renderer.show_pool(grid, &PARTITIONS, &target).ok()?,
+            None => renderer.show_map(map, &target).ok()?,
+        }
         Some(target)
     }
 
@@ -390,6 +405,7 @@ impl<'a> Easel<'a> {
             targets: Targets::default(),
             timer: Timer::new(gpu),
             times: None,
+            grid: None,
         }
     }
 
@@ -437,6 +453,8 @@ impl<'a> Easel<'a> {
 
 impl Costs {
     fn add_times(&mut self, times: &StageTimes, bare_ms: Option<f64>) {
+        self.prepass_ms = Some(times.prepass_ms);
+        self.pages_ms = Some(times.pages_ms);
         self.depth_ms = Some(times.depth_ms);
         self.filter_ms = Some(times.filter_ms);
         self.picture_ms = Some(times.picture_ms);

@@ -54,6 +54,8 @@ pub(crate) enum Overlay {
     Partition,
     /// A tint for each level of detail.
     Clusters,
+    /// A tint for each level of pages.
+    Pages,
 }
 
 impl Overlay {
@@ -75,6 +77,7 @@ impl Overlay {
             Self::Texels => umbrage_render::Overlay::Grid { color: FALSE_LIGHT },
             Self::Partition => umbrage_render::Overlay::Partition { colors: &PARTITIONS },
             Self::Clusters => umbrage_render::Overlay::Clusters { colors: &LEVEL_COLORS },
+            Self::Pages => umbrage_render::Overlay::Pages { colors: &PARTITIONS },
         }
     }
 }
@@ -114,6 +117,8 @@ pub(crate) struct Costs {
     /// Time on the CPU that planning took, milliseconds.
     pub(crate) plan_ms: f64,
     /// Times on the GPU, milliseconds; `None` if the device cannot measure them or has not yet.
+    pub(crate) prepass_ms: Option<f64>,
+    pub(crate) pages_ms: Option<f64>,
     pub(crate) depth_ms: Option<f64>,
     pub(crate) filter_ms: Option<f64>,
     pub(crate) picture_ms: Option<f64>,

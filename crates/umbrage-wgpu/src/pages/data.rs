@@ -64,7 +64,7 @@ pub(crate) struct Frame {
     pub(crate) maps: u32,
     pub(crate) groups: [u32; 2],
     pub(crate) stamp: u32,
-    pub(crate) padding: u32,
+    pub(crate) births: u32,
 }
 
 /// `ShadowPageView`.

@@ -13,7 +13,7 @@ use glam::DVec3;
 pub(crate) use pool::Pages;
 use umbrage::Plan;
 use wgpu::{
-    BindGroup, CommandEncoder, ComputePassTimestampWrites, Device, Queue,
+    BindGroup, Buffer, CommandEncoder, ComputePassTimestampWrites, Device, Queue,
     RenderPassTimestampWrites, TextureView,
 };
 
@@ -62,6 +62,23 @@ pub struct PageCounts {
     pub bias: f32,
     /// The greatest width of a texel that a receiver had, pixels, but for missing pages.
     pub bound: f32,
+}
+
+/// What lies in the texture of pages, for pictures of it. Places lie row by row, as many across as
+/// the texture has room for, and each has gutters around its page.
+#[derive(Clone, Copy, Debug)]
+pub struct PagePool<'a> {
+    /// Eight words for each place, of which the first is the index in the plan of the page's map, or
+    /// `u32::MAX` if there is no page. Those at 5 and 6 are the frame in which the page was wanted
+    /// last, and 1 if it is out of date.
+    pub places: &'a Buffer,
+    /// Words: the one at 2 is the number of the frame, and the one at 3 says where those of the
+    /// frames begin in which each place's page was drawn.
+    pub table: &'a Buffer,
+    /// The number of places.
+    pub count: u32,
+    /// Texels across a place.
+    pub side: u32,
 }
 
 /// A frame whose pages can now be found and drawn with [`encode`](Self::encode).
@@ -162,6 +179,11 @@ impl Shadows {
     /// first. This does not wait for the device.
     pub fn page_counts(&mut self, device: &Device) -> Option<PageCounts> {
         self.pages.as_mut()?.counts(device)
+    }
+
+    /// What lies in the [texture](Self::depth_texture) of pages; `None` before the first frame.
+    pub fn page_pool(&self) -> Option<PagePool<'_>> {
+        self.pages.as_ref()?.pool()
     }
 
     /// Whether [`page_counts`](Self::page_counts) are those of the last frame that was encoded.

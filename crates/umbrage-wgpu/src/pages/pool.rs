@@ -1,7 +1,7 @@
 //! The pool of pages: its buffers, and the passes that find out which pages there are.
 
 use super::data::{self, Level, STATE_WORDS};
-use super::{PageCounts, PageFrame};
+use super::{PageCounts, PageFrame, PagePool};
 use crate::clusters::buffer;
 use crate::passes::depth_pass;
 use crate::readback::Readback;
@@ -53,6 +53,8 @@ pub(crate) struct Pages {
     /// The bind groups of `held`; `None` if a buffer was replaced.
     groups: Option<Groups>,
     frame: u32,
+    /// The texels across a place, with its gutters.
+    place_side: u32,
     /// The workgroups that look at the viewer's depths.
     workgroups: [u32; 2],
     is_multisampled: bool,
@@ -156,6 +158,7 @@ impl Pages {
             grown: None,
             groups: None,
             frame: 0,
+            place_side: 0,
             workgroups: [1; 2],
             is_multisampled: false,
             seen: None,
@@ -174,6 +177,13 @@ impl Pages {
     /// The levels of the plan's maps.
     pub(crate) fn levels(&self) -> &[Level] {
         &self.levels
+    }
+
+    /// What lies in the texture.
+    pub(crate) fn pool(&self) -> Option<PagePool<'_>> {
+        let (held, key) = (self.held.as_ref()?, self.key.as_ref()?);
+        let side = self.place_side;
+        Some(PagePool { places: &held.placed, table: &held.table, count: key.places, side })
     }
 
     /// Memory of what lookups read beside the texture, bytes.
@@ -386,6 +396,7 @@ impl Shadows {
         std::mem::swap(&mut self.lookup, &mut self.uploaded);
 
         pages.frame = pages.frame.wrapping_add(1);
+        pages.place_side = place_side;
         let is_multisampled = depth.texture().sample_count() > 1;
         pages.is_multisampled = is_multisampled;
         pages.workgroups = paging.camera.image().map(|n| n.div_ceil(REQUEST_SIDE));
@@ -408,7 +419,7 @@ impl Shadows {
             maps: plan.maps.len() as u32,
             groups: pages.workgroups,
             stamp: STAMPS.wrapping_mul(pages.frame),
-            padding: 0,
+            births: table_words,
         };
         let view = data::View {
             base: projection.base as f32,
@@ -468,7 +479,8 @@ impl Pages {
         self.groups = None;
         self.held = Some(Held {
             levels: stored(device, size_of_val(&*self.levels), none),
-            table: stored(device, words(table_words), none),
+            // Behind the table come the frames in which pages were drawn.
+            table: stored(device, words(table_words + places), none),
             stamps: stored(device, words(table_words), none),
             placed: buffer(device, &vec![empty; places as usize], BufferUsages::STORAGE),
             wanted: stored(device, words(4 * room), none),

@@ -413,7 +413,7 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPageFrame",
         ours::Frame,
-        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups, stamp]
+        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups, stamp, births]
     );
     let (module, _) = validated(&page_request(&Filter::Hard, false));
     check_layout!(
