@@ -10,10 +10,9 @@
 //!
 //! # Depths
 //! Under parallel light depths count in *slabs* of [`SLAB_TEXELS`] texels of the page's level, and
-//! a page belongs to the slab of its receivers. Depth runs from 0 at the near side of the slab
-//! before, over ½ where the receivers' slab begins, to 1 at its end. So single precision resolves
-//! 1/128 of a texel wherever the page is, casters up to a slab away keep their distance, and nearer
-//! ones are clamped to 0. Under a lamp depths run from its near distance to its range.
+//! a page belongs to the slab of its receivers. Depth runs from 0, [`AHEAD_TEXELS`] before the slab,
+//! to 1 at its end. So single precision resolves 1/200 of a texel wherever the page is; casters
+//! nearer to the light are clamped to 0. Under a lamp depths run from its near distance to its range.
 //!
 //! # Levels
 //! A receiver is looked up on the largest level whose texels are no wider across the light than
@@ -65,6 +64,11 @@ pub const PAGE_AREA: u64 = PAGE_TEXELS as u64 * PAGE_TEXELS as u64;
 
 /// The thickness of a slab under parallel light, texels of the page's level.
 pub const SLAB_TEXELS: f64 = 65536.0;
+
+/// How far ahead of a slab the depths of its maps begin, texels of the page's level. Casters nearer
+/// to the light have depth 0, whatever their distance: single precision then tells as small steps
+/// apart as possible, and no filter's gutter holds the penumbra of a caster so far away.
+pub const AHEAD_TEXELS: f64 = 8192.0;
 
 /// The least error that can be asked for, pixels.
 pub const LEAST_ERROR: f64 = 0.25;

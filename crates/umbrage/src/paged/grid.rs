@@ -1,7 +1,8 @@
 //! The planes of grids: where points lie on them, and the maps of windows and pages.
 
 use super::{
-    Level, MOST_BIAS, PAGE_TEXELS, Page, SLAB_TEXELS, floor_log2, page_width, texel_width,
+    AHEAD_TEXELS, Level, MOST_BIAS, PAGE_TEXELS, Page, SLAB_TEXELS, floor_log2, page_width,
+    texel_width,
 };
 use crate::bounds::Plane;
 use crate::camera::Camera;
@@ -207,12 +208,13 @@ impl Projection {
         let ends = [(self.x, low[0], high[0]), (self.z, low[1], high[1])];
         match self.lamp {
             None => {
-                let thickness = 2.0 * slab_width(level.level);
+                let ahead = AHEAD_TEXELS * texel_width(level.level);
+                let thickness = ahead + slab_width(level.level);
                 // Distances from the planes s = 0, t = 0 and depth = 0 at the origin.
                 let begin = [
                     self.x.dot(origin) - first[0],
                     self.z.dot(origin) - first[1],
-                    self.along.dot(origin) - (level.slab - 1) as f64 * (thickness / 2.0),
+                    self.along.dot(origin) + ahead - level.slab as f64 * slab_width(level.level),
                 ];
                 let axes = [(self.x, width), (self.z, width), (self.along, thickness)];
                 let row = |i: usize| (axes[i].0 / axes[i].1).extend(begin[i] / axes[i].1);

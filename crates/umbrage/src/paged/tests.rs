@@ -125,7 +125,7 @@ proptest! {
             if matches!(light, Light::Directional { .. }) {
                 let is_last = place.map + 2 >= plan.maps.len();
                 prop_assert!(2.0 * texel > bound * pixel * (1.0 - 1e-6) || is_last);
-                prop_assert!(receiver.depth >= 0.5 - 1e-9 && receiver.depth <= 1.0 + 1e-9);
+                prop_assert!(receiver.depth >= 1.0 / 9.0 - 1e-9 && receiver.depth <= 1.0 + 1e-9);
             }
             prop_assert_eq!(level.level, place.page.level);
         }
