@@ -24,7 +24,7 @@ use wgpu::{
 /// - storage buffers in vertex shaders, indirect draws, or ten storage buffers in compute shaders,
 ///   there are no [clusters](crate::ClusterGeometry) but [`MeshCasters`](crate::MeshCasters) alone,
 ///   whose time grows with the number of triangles;
-/// - what clusters need, and an eleventh storage buffer in compute shaders, plans with
+/// - what clusters need, and twelve storage buffers in compute shaders, plans with
 ///   [pages](umbrage::paged) are [`Error::Unsupported`]: take what
 ///   [`instead_of_pages`](Self::instead_of_pages) gives;
 /// - compute shaders, or fetching depths, [`SeenReadback`](crate::SeenReadback) is
@@ -80,7 +80,7 @@ const STORAGE_BUFFERS: u32 = 3;
 const CLUSTER_BUFFERS: u32 = 10;
 
 /// The number of storage buffers that the choice of clusters for pages uses at once.
-const PAGE_BUFFERS: u32 = 11;
+const PAGE_BUFFERS: u32 = 12;
 
 impl Support {
     /// Features that make shadows faster or allow more filters. Request those that the adapter has

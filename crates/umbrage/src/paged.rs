@@ -277,6 +277,14 @@ impl Grid {
         self.first_level + (self.maps.len() / self.slabs) as i32 - 1
     }
 
+    /// Whether an address stands for the same page in both grids, whichever levels they have: what
+    /// was drawn for one plan then serves the other.
+    pub fn has_pages_of(&self, other: &Self) -> bool {
+        let Self { light, side, maps: _, first_level: _, slabs, projection } = self;
+        (light, side, slabs, projection)
+            == (&other.light, &other.side, &other.slabs, &other.projection)
+    }
+
     /// Which part of the view a level serves.
     fn part(&self, level: i32) -> Part {
         let slice = (level - self.first_level) as usize;

@@ -224,6 +224,44 @@ fn pages_are_kept() {
     }
 }
 
+/// Pages serve on when the camera's range of distances, its field of view or its picture change,
+/// though levels and windows are others.
+#[needs(gpu)]
+#[test]
+fn pages_outlive_the_levels_of_a_plan() {
+    let scene = scene("town:4");
+    let mut set = Set::new(&scene, IMAGE);
+    let light = set.light();
+    let technique: Technique = "paged@1024".parse().unwrap();
+    let buffers = buffers(&scene);
+    let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+    let mut view = scene.default_view();
+    let first_level = |plan: &Plan| plan.paging.as_ref().unwrap().grids[0].first_level;
+    let mut levels = Vec::new();
+    for (near, far, fov) in [(1.0, 1.0, 1.0), (0.1, 1.0, 1.0), (9.0, 0.5, 1.0), (1.0, 2.0, 0.97)] {
+        let default = scene.default_view();
+        view.near = default.near * near;
+        view.far = default.far * far;
+        if let (Lens::Perspective { fov_y_rad }, Lens::Perspective { fov_y_rad: whole }) =
+            (&mut view.lens, default.lens)
+        {
+            *fov_y_rad = whole * fov;
+        }
+        set.camera = view.camera(IMAGE).unwrap();
+        let plan = set.plan(&[light], &technique);
+        levels.push(first_level(&plan));
+        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+        let counts = renderer.page_counts().unwrap();
+        let is_first = levels.len() == 1;
+        assert!(is_first || counts.drawn * 4 < counts.wanted, "{levels:?}: {counts:?}");
+        let kept = Drawn::by(&mut renderer, &set.camera, &light);
+        let (fresh, _) = Drawn::of(&set, &plan, &technique);
+        let differ = kept.differ(&fresh);
+        assert!(differ * 1000 <= fresh.visibility.len(), "{levels:?}: {differ} differ");
+    }
+    assert!(levels[1] < levels[0] && levels[2] > levels[0], "{levels:?}");
+}
+
 /// After a thousand frames, pages that were kept, given up and drawn again show what new ones do.
 #[needs(gpu)]
 #[test]

@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use umbrage::paged::{FALLBACK_LEVELS, PAGE_TEXELS, Paging};
+use umbrage::paged::{FALLBACK_LEVELS, Grid, PAGE_TEXELS, Paging};
 use umbrage::{Aabb, Camera, ShadowMap, ViewRay};
 
 /// `ShadowPageLevel`.
@@ -17,10 +17,8 @@ pub(crate) struct Level {
     pub(crate) levels: u32,
     pub(crate) slabs: u32,
     pub(crate) slab: i32,
-    pub(crate) is_second: u32,
     pub(crate) coarser: u32,
     pub(crate) coarser_by: u32,
-    pub(crate) padding: u32,
     pub(crate) to_coarser: [i32; 2],
 }
 
@@ -132,10 +130,8 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
                 levels: (grid.last_level() - own.level + 1) as u32,
                 slabs: slabs as u32,
                 slab: own.slab as i32,
-                is_second: slab_of_level as u32,
                 coarser: if by == 0 { EMPTY } else { coarser },
                 coarser_by: by as u32,
-                padding: 0,
                 to_coarser: std::array::from_fn(|axis| {
                     let first = |map: usize| paging.levels[map].first_page[axis];
                     (first(map) - (first(coarser as usize) << by)) as i32
@@ -147,6 +143,21 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
         }
     }
     (levels, table)
+}
+
+/// For each map of a plan the first map of the same level in the next plan, whose grids are the same
+/// but for their levels; `EMPTY` if that has no such level.
+pub(crate) fn levels_now(before: &[Grid], now: &[Grid]) -> Vec<u32> {
+    let mut maps = Vec::new();
+    for (before, now) in before.iter().zip(now) {
+        for offset in 0..before.maps.len() {
+            let level = before.first_level + (offset / before.slabs) as i32;
+            let is_there = (now.first_level..=now.last_level()).contains(&level);
+            let first = now.maps.start as i32 + (level - now.first_level) * now.slabs as i32;
+            maps.push(if is_there { first as u32 } else { EMPTY });
+        }
+    }
+    maps
 }
 
 /// The pages of a map that the shadow of a box (world space) may touch: first column and row, and

@@ -66,12 +66,29 @@ pub(crate) struct Pages {
     counts: Option<PageCounts>,
 }
 
-/// What pages depend on that are kept from frame to frame.
+/// What the table of pages depends on.
 #[derive(Clone, Debug, PartialEq)]
 struct Key {
     grids: Vec<Grid>,
     sides: Vec<u32>,
     places: u32,
+}
+
+impl Key {
+    fn new(paging: &Paging, places: u32) -> Self {
+        let sides = paging.levels.iter().map(|level| level.side).collect();
+        Self { grids: paging.grids.clone(), sides, places }
+    }
+
+    /// Whether pages of the one are pages of the other: whether lights and room are the same, though
+    /// levels and windows may differ, as with the camera's range of distances, its field of view or
+    /// the picture's size.
+    fn is_of_same_pages(&self, other: &Self) -> bool {
+        let mut pairs = self.grids.iter().zip(&other.grids);
+        self.places == other.places
+            && self.grids.len() == other.grids.len()
+            && pairs.all(|(grid, other)| grid.has_pages_of(other))
+    }
 }
 
 /// Counts that are on their way.
@@ -106,6 +123,8 @@ struct Uniforms {
 /// The buffers of a pool.
 #[derive(Debug)]
 struct Held {
+    places: u32,
+    levels_now: Buffer,
     levels: Buffer,
     table: Buffer,
     stamps: Buffer,
@@ -365,18 +384,22 @@ impl Shadows {
         };
         let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
         pages.levels = levels;
-        let is_same = pages.key.as_ref().is_some_and(|key| {
-            key.places == places
-                && key.grids == paging.grids
-                && key.sides.iter().eq(paging.levels.iter().map(|level| &level.side))
-        });
-        if !is_same {
-            let sides = paging.levels.iter().map(|level| level.side).collect();
-            pages.key = Some(Key { grids: paging.grids.clone(), sides, places });
-            pages.make(device, queue, places, table_words);
+        let key = Key::new(paging, places);
+        let before = pages.key.replace(key.clone()).filter(|before| before.is_of_same_pages(&key));
+        let is_same = before.is_some();
+        let grids_before = match &before {
+            Some(before) => before.grids.clone(),
+            None => {
+                pages.make(device, queue, places);
+                paging.grids.clone()
+            }
+        };
+        if before.is_none_or(|before| before != key) {
+            pages.make_tables(device, table_words);
             rebind = true;
         }
-        pages.hold_boxes(device, touched.len());
+        let levels_now = data::levels_now(&grids_before, &paging.grids);
+        pages.hold(device, touched.len(), levels_now.len());
         if rebind || pages.groups.is_none() {
             pages.bind(device, buffers.maps());
         }
@@ -435,6 +458,7 @@ impl Shadows {
         queue.write_buffer(&uniforms.pool, 0, bytemuck::bytes_of(&pool));
         queue.write_buffer(&held.levels, 0, bytemuck::cast_slice(&pages.levels));
         queue.write_buffer(&held.boxes, 0, bytemuck::cast_slice(&touched));
+        queue.write_buffer(&held.levels_now, 0, bytemuck::cast_slice(&levels_now));
         if seen.as_ref().is_none_or(|(bound, _)| bound != depth) {
             let layout = &pipelines.request_layouts[usize::from(is_multisampled)];
             let buffers = [&uniforms.view, &held.stamps, &held.wanted, &held.state];
@@ -465,8 +489,24 @@ impl Pages {
             .collect()
     }
 
-    /// Makes an empty pool of so many places, with a table of so many words.
-    fn make(&mut self, device: &Device, queue: &Queue, places: u32, table_words: u32) {
+    /// Makes empty tables of so many words for the present levels. Pages that have places are entered
+    /// when the frame begins.
+    fn make_tables(&mut self, device: &Device, table_words: u32) {
+        let Some(held) = &mut self.held else { return };
+        let none = BufferUsages::empty();
+        let words = |n: u32| 4 * n as usize;
+        let levels = self.levels.len() as u32;
+        held.levels = stored(device, size_of_val(&*self.levels), none);
+        // Behind the table come the frames in which pages were drawn.
+        held.table = stored(device, words(table_words + held.places), none);
+        held.stamps = stored(device, words(table_words), none);
+        held.shown = stored(device, words(4 * levels + table_words), none);
+        self.groups = None;
+        self.seen = None;
+    }
+
+    /// Makes an empty pool of so many places, without tables.
+    fn make(&mut self, device: &Device, queue: &Queue, places: u32) {
         let room = 2 * places + 1024;
         let words = |n: u32| 4 * n as usize;
         let none = BufferUsages::empty();
@@ -475,13 +515,12 @@ impl Pages {
         queue.write_buffer(&calls, 0, bytemuck::cast_slice(&[0u32, 1, 1, 0, 6, 0, 0, 0]));
         let empty = data::PlacedPage { map: data::EMPTY, ..bytemuck::Zeroable::zeroed() };
         let places_of = |size: usize| places as usize * size;
-        self.seen = None;
-        self.groups = None;
         self.held = Some(Held {
-            levels: stored(device, size_of_val(&*self.levels), none),
-            // Behind the table come the frames in which pages were drawn.
-            table: stored(device, words(table_words + places), none),
-            stamps: stored(device, words(table_words), none),
+            places,
+            levels_now: stored(device, 0, none),
+            levels: stored(device, 0, none),
+            table: stored(device, 0, none),
+            stamps: stored(device, 0, none),
             placed: buffer(device, &vec![empty; places as usize], BufferUsages::STORAGE),
             wanted: stored(device, words(4 * room), none),
             state: stored(device, 4 * STATE_WORDS, BufferUsages::COPY_SRC),
@@ -489,7 +528,7 @@ impl Pages {
             lists: stored(device, words(places + room), none),
             calls,
             boxes: stored(device, 0, none),
-            shown: stored(device, words(4 * self.levels.len() as u32 + table_words), none),
+            shown: stored(device, 0, none),
             room,
             pending: Pending {
                 number: 0,
@@ -501,13 +540,15 @@ impl Pages {
         });
     }
 
-    /// Makes room for so many rectangles of pages.
-    fn hold_boxes(&mut self, device: &Device, count: usize) {
+    /// Makes room for so many rectangles of pages, and maps of the last frame.
+    fn hold(&mut self, device: &Device, boxes: usize, maps: usize) {
         let Some(held) = &mut self.held else { return };
-        let bytes = count * size_of::<[i32; 4]>();
-        if held.boxes.size() < bytes as u64 {
-            held.boxes = stored(device, bytes.next_power_of_two(), BufferUsages::empty());
-            self.groups = None;
+        let sizes = [boxes * size_of::<[i32; 4]>(), maps * size_of::<u32>()];
+        for (buffer, bytes) in [&mut held.boxes, &mut held.levels_now].into_iter().zip(sizes) {
+            if buffer.size() < bytes as u64 {
+                *buffer = stored(device, bytes.next_power_of_two(), BufferUsages::empty());
+                self.groups = None;
+            }
         }
     }
 
@@ -527,6 +568,7 @@ impl Pages {
             &held.boxes,
             &held.shown,
             &held.stamps,
+            &held.levels_now,
         ];
         let of_draw = [&self.uniforms.pool, &held.fresh, maps];
         self.groups = Some(Groups {
@@ -641,7 +683,7 @@ impl Pipelines {
         });
         let of_allocation = [
             UNIFORM, WRITTEN, READ, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, READ,
-            WRITTEN, WRITTEN,
+            WRITTEN, WRITTEN, READ,
         ];
         let allocate_layout = layout(ShaderStages::COMPUTE, &of_allocation.map(of_buffer));
         let draw_layout = layout(ShaderStages::VERTEX, &[UNIFORM, READ, READ].map(of_buffer));

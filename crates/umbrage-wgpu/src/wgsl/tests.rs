@@ -397,10 +397,7 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPageLevel",
         ours::Level,
-        [
-            first, side, table, level, levels, slabs, slab, is_second, coarser, coarser_by,
-            to_coarser
-        ]
+        [first, side, table, level, levels, slabs, slab, coarser, coarser_by, to_coarser]
     );
     check_layout!(
         &module,
