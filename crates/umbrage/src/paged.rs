@@ -12,7 +12,10 @@
 //! Under parallel light depths count in *slabs* of [`SLAB_TEXELS`] texels of the page's level, and
 //! a page belongs to the slab of its receivers. Depth runs from 0, [`AHEAD_TEXELS`] before the slab,
 //! to 1 at its end. So single precision resolves 1/200 of a texel wherever the page is; casters
-//! nearer to the light are clamped to 0. Under a lamp depths run from its near distance to its range.
+//! nearer to the light are clamped to 0. A lamp's light has two slabs, on all levels the same: one
+//! from its near distance to the geometric mean of that and its range, and one from there on.
+//! Depths of the second begin at an eighth of that distance, so that a caster that is a thousand
+//! times as near as the farthest receivers does not cost these their precision.
 //!
 //! # Levels
 //! A receiver is looked up on the largest level whose texels are no wider across the light than
@@ -120,7 +123,7 @@ pub struct Grid {
     pub maps: Range<usize>,
     /// The finest level.
     pub first_level: i32,
-    /// Neighbouring slabs that receivers of a level may lie in: 2 under parallel light, else 1.
+    /// Neighbouring slabs that receivers of a level may lie in: 2.
     pub slabs: usize,
     projection: Projection,
 }
@@ -283,6 +286,11 @@ impl Grid {
         let Self { light, side, maps: _, first_level: _, slabs, projection } = self;
         (light, side, slabs, projection)
             == (&other.light, &other.side, &other.slabs, &other.projection)
+    }
+
+    /// The slab of a level `levels_coarser` levels coarser that holds a slab.
+    pub fn coarser_slab(&self, slab: i64, levels_coarser: i32) -> i64 {
+        self.projection.coarser_slab(slab, levels_coarser)
     }
 
     /// Which part of the view a level serves.

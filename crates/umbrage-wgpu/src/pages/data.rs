@@ -114,10 +114,9 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
             let slabs = grid.slabs as i64;
             let slab_of_level = offset as i64 % slabs;
             let words = own.side * own.side;
-            // Slabs are as many times as thick on a coarser level as its texels are wide.
-            let by = i64::from(FALLBACK_LEVELS.min(grid.last_level() - own.level));
-            let coarser_first = map - slab_of_level as usize + (by * slabs) as usize;
-            let is_behind = (own.slab >> by) > paging.levels[coarser_first].slab;
+            let by = FALLBACK_LEVELS.min(grid.last_level() - own.level);
+            let coarser_first = map - slab_of_level as usize + by as usize * grid.slabs;
+            let is_behind = grid.coarser_slab(own.slab, by) > paging.levels[coarser_first].slab;
             let coarser = (coarser_first + usize::from(is_behind && slabs > 1)) as u32;
             // The windows of neighbouring slabs take turns, so that a slab keeps its place in the
             // table when it becomes the first one.

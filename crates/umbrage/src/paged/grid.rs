@@ -33,6 +33,24 @@ struct Lamp {
     range: f64,
 }
 
+impl Lamp {
+    /// The distance along the axis at which the second slab begins: as many times the near distance
+    /// as the range is times this distance.
+    fn middle(&self) -> f64 {
+        (self.near * self.range).sqrt()
+    }
+
+    /// The distances along the axis between which a slab's depths run. Those of the second slab begin
+    /// before it, so that casters ahead of it keep their distance.
+    fn depths(&self, slab: i64) -> [f64; 2] {
+        let middle = self.middle();
+        match slab {
+            0 => [self.near, middle],
+            _ => [self.near.max(middle / AHEAD_OF_LAMP), self.range],
+        }
+    }
+}
+
 /// A point on a grid's plane.
 pub(super) struct OnPlane {
     pub(super) plane: DVec2,
@@ -52,6 +70,9 @@ pub(super) struct Window {
     pub(super) side: f64,
     pub(super) slab: i64,
 }
+
+/// How many times as far from a lamp its second slab begins as the depths of that slab do.
+const AHEAD_OF_LAMP: f64 = 8.0;
 
 /// How far outside a lamp's light points still count, as a share of its extent.
 const ROUNDING: f64 = 1e-9;
@@ -86,8 +107,16 @@ impl Projection {
     pub(super) fn slab(&self, world_position: DVec3, level: i32) -> i64 {
         match self.lamp {
             None => (self.along.dot(world_position) / slab_width(level)).floor() as i64,
-            Some(_) => 0,
+            Some(lamp) => {
+                let distance = self.along.dot(world_position - lamp.position);
+                i64::from(distance >= lamp.middle())
+            }
         }
+    }
+
+    /// The slab of a coarser level that holds a slab.
+    pub(super) fn coarser_slab(&self, slab: i64, levels_coarser: i32) -> i64 {
+        if self.lamp.is_some() { slab } else { slab >> levels_coarser }
     }
 
     /// The levels that receivers of a camera need, up to the largest bias.
@@ -101,8 +130,7 @@ impl Projection {
             // A page of this level covers a quarter of the plane or more.
             Some(lamp) => level(lamp.slope / f64::from(PAGE_TEXELS)) + 1,
         };
-        let slabs = if self.lamp.is_some() { 1 } else { 2 };
-        Views { levels: finest.min(coarsest)..coarsest + 1, slabs }
+        Views { levels: finest.min(coarsest)..coarsest + 1, slabs: 2 }
     }
 
     /// The least window with all receivers of a level: see the module's documentation.
@@ -239,10 +267,11 @@ impl Projection {
                 let d = self.along.extend(-self.along.dot(apex));
                 let row =
                     |axis: DVec3, first: f64| ((axis.extend(-axis.dot(apex))) - d * first) / width;
-                // Depth is α − β/d at the distance d from the lamp: 0 at its near distance and 1 at
-                // its range.
-                let span = lamp.near.recip() - lamp.range.recip();
-                let [alpha, beta] = [(lamp.near * span).recip(), span.recip()];
+                // Depth is α − β/d at the distance d from the lamp: 0 where the slab's depths begin,
+                // and 1 where it ends.
+                let [near, far] = lamp.depths(level.slab);
+                let span = near.recip() - far.recip();
+                let [alpha, beta] = [(near * span).recip(), span.recip()];
                 let rows = [row(self.x, first[0]), row(self.z, first[1]), d * alpha];
                 let depth = rows[2] - DVec4::W * beta;
                 map.shadow_from_local = DMat4::from_cols(rows[0], rows[1], depth, d).transpose();
@@ -255,8 +284,8 @@ impl Projection {
                     apex.extend(1.0) * (alpha / beta) + toward.extend(0.0),
                 );
                 map.apex = Some(apex);
-                map.slab = Slab::Distances { axis: self.along, near: lamp.near, far: lamp.range };
-                map.begin_earlier(MARGIN_TEXELS * texel_width(level.level) / (lamp.near * span));
+                map.slab = Slab::Distances { axis: self.along, near, far };
+                map.begin_earlier(MARGIN_TEXELS * texel_width(level.level) / (near * span));
                 for (axis, low, high) in ends {
                     for normal in
                         [axis - self.along * (low - reach), self.along * (high + reach) - axis]
@@ -264,7 +293,7 @@ impl Projection {
                         map.caster_planes.push(Plane::through(apex, normal.normalize()));
                     }
                 }
-                let end = apex + self.along * lamp.range;
+                let end = apex + self.along * far;
                 map.caster_planes.push(Plane::through(end, -self.along));
             }
         }
