@@ -274,8 +274,7 @@ fn a_long_walk_keeps_pages_right() {
     let buffers = buffers(&scene);
     let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
     let mut drawn = 0;
-    let mut cameras = walk(&scene, 1000).enumerate();
-    while let Some((frame, camera)) = cameras.next() {
+    for (frame, camera) in walk(&scene, 1000).enumerate() {
         set.camera = camera;
         let plan = set.plan(&[light], &technique);
         renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
@@ -314,7 +313,7 @@ fn pages_are_shown() {
     let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
     let target = FrameTarget::new(&GPU, IMAGE).unwrap();
     let overlay = Overlay::Pages { colors: &PARTITIONS };
-    let mut shown = |renderer: &mut Renderer<'_>| {
+    let shown = |renderer: &mut Renderer<'_>| {
         renderer.frame_with(&overlay, &shading, &target, None).unwrap();
         renderer.show_pool(grid, &PARTITIONS, &pool).unwrap();
         [target.read(&GPU).unwrap(), pool.read(&GPU).unwrap()]
