@@ -25,8 +25,20 @@ fn every_stage_has_its_times() {
             assert_eq!(result["map_draws"].as_array().unwrap().len(), maps);
             assert!(result["map_draws"][0]["triangles"].as_u64().unwrap() > 0);
             assert!(result["bytes"].as_u64().unwrap() >= 4 * result["texels"].as_u64().unwrap());
-            let stages = ["cpu", "depth", "filter", "frame", "plan", "seen", "shade", "shade_none"];
+            let stages = [
+                "cpu",
+                "depth",
+                "filter",
+                "frame",
+                "pages",
+                "plan",
+                "prepass",
+                "seen",
+                "shade",
+                "shade_none",
+            ];
             assert_eq!(keys(&result["ms"]), stages);
+            assert!(result["ms"]["pages"].is_null() && result["ms"]["prepass"].is_null());
             for stage in ["plan", "depth", "shade", "shade_none", "frame"] {
                 let spread = &result["ms"][stage];
                 let [min, median, max] =

@@ -158,6 +158,10 @@ fn gpus_draw_pages() {
     let share = |i: usize| bench["results"][i]["drawn_share"].as_f64().unwrap();
     assert!(share(0) < 0.1 && share(1) == 1.0, "{} {}", share(0), share(1));
     assert_eq!(bench["walk"], 1.4);
+    for stage in ["prepass", "pages", "depth", "shade"] {
+        let median = bench["results"][0]["ms"][stage]["median"].as_f64();
+        assert!(median.is_some_and(|ms| ms > 0.0), "{stage}: {}", bench["results"][0]["ms"]);
+    }
     for speed in ["0", "-1", "nan", "fast"] {
         let run = desk.run(&["bench", "pole", &format!("--walk={speed}")]);
         assert!(run.code != 0 && run.stderr.contains("--walk"), "{}", run.stderr);
