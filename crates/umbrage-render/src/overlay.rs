@@ -50,7 +50,8 @@ pub enum Overlay<'a> {
     },
 }
 
-/// Number of colours for maps and for levels of pages, after which they repeat, as in `wgsl/overlay.wgsl`.
+/// Number of colours for maps and for levels of pages, after which they repeat, as in
+/// `wgsl/overlay.wgsl`.
 pub const PARTITION_COLORS: usize = 7;
 
 /// Number of colours for levels of detail, as in `wgsl/overlay.wgsl`.

@@ -109,8 +109,8 @@ impl Renderer<'_> {
     /// Draws the texture in which [pages](umbrage::paged) lie into a target of any size, without
     /// waiting for the device. `grid` is one of those of the plan that was drawn last, which must have
     /// a single light. A page is tinted by its level with one of `colors` (sRGB): level l with that
-    /// whose number is l modulo their number. What is nearer to the light is lighter, in greys that are spread over
-    /// the page's own depths. Pages are lighter in the 30 frames after they were drawn, and dim
+    /// whose number is l modulo their number. What is nearer to the light is lighter, in greys that
+    /// are spread over the page's own depths. Pages are lighter in the 30 frames after they were drawn, and dim
     /// where the last frame did not want them. Free places are dark blue.
     ///
     /// # Errors

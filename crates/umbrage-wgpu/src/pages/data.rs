@@ -117,7 +117,7 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
             let by = FALLBACK_LEVELS.min(grid.last_level() - own.level);
             let coarser_first = map - slab_of_level as usize + by as usize * grid.slabs;
             let is_behind = grid.coarser_slab(own.slab, by) > paging.levels[coarser_first].slab;
-            let coarser = (coarser_first + usize::from(is_behind && slabs > 1)) as u32;
+            let coarser = (coarser_first + usize::from(is_behind)) as u32;
             // The windows of neighbouring slabs take turns, so that a slab keeps its place in the
             // table when it becomes the first one.
             let turn = own.slab.rem_euclid(slabs) as u32;

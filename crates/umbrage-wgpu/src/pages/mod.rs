@@ -183,7 +183,7 @@ impl Shadows {
 
     /// What lies in the [texture](Self::depth_texture) of pages; `None` before the first frame.
     pub fn page_pool(&self) -> Option<PagePool<'_>> {
-        self.pages.as_ref()?.pool()
+        self.pages.as_ref()?.pool(&self.options.filter)
     }
 
     /// Whether [`page_counts`](Self::page_counts) are those of the last frame that was encoded.

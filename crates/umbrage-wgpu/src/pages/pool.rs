@@ -53,8 +53,6 @@ pub(crate) struct Pages {
     /// The bind groups of `held`; `None` if a buffer was replaced.
     groups: Option<Groups>,
     frame: u32,
-    /// The texels across a place, with its gutters.
-    place_side: u32,
     /// The workgroups that look at the viewer's depths.
     workgroups: [u32; 2],
     is_multisampled: bool,
@@ -123,7 +121,8 @@ struct Uniforms {
 /// The buffers of a pool.
 #[derive(Debug)]
 struct Held {
-    places: u32,
+    /// The grids of the frame that was encoded last, whose maps places name.
+    entered: Vec<Grid>,
     levels_now: Buffer,
     levels: Buffer,
     table: Buffer,
@@ -177,7 +176,6 @@ impl Pages {
             grown: None,
             groups: None,
             frame: 0,
-            place_side: 0,
             workgroups: [1; 2],
             is_multisampled: false,
             seen: None,
@@ -199,9 +197,9 @@ impl Pages {
     }
 
     /// What lies in the texture.
-    pub(crate) fn pool(&self) -> Option<PagePool<'_>> {
+    pub(crate) fn pool(&self, filter: &Filter) -> Option<PagePool<'_>> {
         let (held, key) = (self.held.as_ref()?, self.key.as_ref()?);
-        let side = self.place_side;
+        let side = place_side(filter);
         Some(PagePool { places: &held.placed, table: &held.table, count: key.places, side })
     }
 
@@ -277,6 +275,9 @@ impl Pages {
         if let Some(readback) = self.readbacks.iter_mut().find(|r| r.is_free()) {
             let pending = Pending { number: self.encoded, ..held.pending };
             readback.send(encoder, &held.state, pending);
+        }
+        if let (Some(held), Some(key)) = (&mut self.held, &self.key) {
+            held.entered.clone_from(&key.grids);
         }
     }
 
@@ -357,7 +358,7 @@ impl Shadows {
     ) {
         let PageFrame { plan, render_origin, casters, depth, projection } = *frame;
         let filter = self.options.filter;
-        let place_side = PAGE_TEXELS + 2 * filter.reach_texels();
+        let place_side = place_side(&filter);
         let Self { pages, lookup, texture, buffers, support, .. } = self;
         let Some(pages) = pages else { return };
         pages.collect();
@@ -385,20 +386,17 @@ impl Shadows {
         let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
         pages.levels = levels;
         let key = Key::new(paging, places);
-        let before = pages.key.replace(key.clone()).filter(|before| before.is_of_same_pages(&key));
-        let is_same = before.is_some();
-        let grids_before = match &before {
-            Some(before) => before.grids.clone(),
-            None => {
-                pages.make(device, queue, places);
-                paging.grids.clone()
-            }
-        };
-        if before.is_none_or(|before| before != key) {
-            pages.make_tables(device, table_words);
+        let is_same = pages.key.as_ref().is_some_and(|before| before.is_of_same_pages(&key));
+        if !is_same {
+            pages.make(device, queue, places);
+        }
+        if !is_same || pages.key.as_ref() != Some(&key) {
+            pages.make_tables(device, table_words, places);
             rebind = true;
         }
-        let levels_now = data::levels_now(&grids_before, &paging.grids);
+        pages.key = Some(key);
+        let entered = pages.held.as_ref().map_or(&[][..], |held| &held.entered);
+        let levels_now = data::levels_now(entered, &paging.grids);
         pages.hold(device, touched.len(), levels_now.len());
         if rebind || pages.groups.is_none() {
             pages.bind(device, buffers.maps());
@@ -419,7 +417,6 @@ impl Shadows {
         std::mem::swap(&mut self.lookup, &mut self.uploaded);
 
         pages.frame = pages.frame.wrapping_add(1);
-        pages.place_side = place_side;
         let is_multisampled = depth.texture().sample_count() > 1;
         pages.is_multisampled = is_multisampled;
         pages.workgroups = paging.camera.image().map(|n| n.div_ceil(REQUEST_SIDE));
@@ -491,14 +488,14 @@ impl Pages {
 
     /// Makes empty tables of so many words for the present levels. Pages that have places are entered
     /// when the frame begins.
-    fn make_tables(&mut self, device: &Device, table_words: u32) {
+    fn make_tables(&mut self, device: &Device, table_words: u32, places: u32) {
         let Some(held) = &mut self.held else { return };
         let none = BufferUsages::empty();
         let words = |n: u32| 4 * n as usize;
         let levels = self.levels.len() as u32;
         held.levels = stored(device, size_of_val(&*self.levels), none);
         // Behind the table come the frames in which pages were drawn.
-        held.table = stored(device, words(table_words + held.places), none);
+        held.table = stored(device, words(table_words + places), none);
         held.stamps = stored(device, words(table_words), none);
         held.shown = stored(device, words(4 * levels + table_words), none);
         self.groups = None;
@@ -516,7 +513,7 @@ impl Pages {
         let empty = data::PlacedPage { map: data::EMPTY, ..bytemuck::Zeroable::zeroed() };
         let places_of = |size: usize| places as usize * size;
         self.held = Some(Held {
-            places,
+            entered: Vec::new(),
             levels_now: stored(device, 0, none),
             levels: stored(device, 0, none),
             table: stored(device, 0, none),
@@ -577,6 +574,11 @@ impl Pages {
             shown: None,
         });
     }
+}
+
+/// The texels across a place, with its gutters.
+fn place_side(filter: &Filter) -> u32 {
+    PAGE_TEXELS + 2 * filter.reach_texels()
 }
 
 /// A buffer of so many bytes for shaders.
