@@ -44,6 +44,7 @@
 //! lie within ρ (1 + (t + ρ)/(1 − ρ)) of the eye's, where t is the tangent of half the opening
 //! angle, and the window is that wide. Otherwise it covers the whole plane.
 
+mod aging;
 mod fit;
 mod grid;
 #[cfg(test)]
@@ -55,6 +56,7 @@ use crate::light::Light;
 use crate::plan::{CubeSide, MapError, Part, Plan, PlannedLight, Receiver, ShadowMap};
 use crate::technique::{Cover, Size, Technique};
 use crate::warp::theta;
+pub use aging::{AgingLights, LightAge};
 use glam::{DVec2, DVec3};
 use grid::Projection;
 use std::ops::Range;
@@ -109,6 +111,18 @@ pub struct Paging {
     pub grids: Vec<Grid>,
     /// One level, with its slab, for each map of the plan.
     pub levels: Vec<Level>,
+    /// The lights whose pages can wait; `None` if all are looked up in this frame.
+    pub coming: Option<ComingLights>,
+}
+
+/// The lights of a plan whose pages are drawn ahead of the frame in which they are looked up: see
+/// [`AgingLights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ComingLights {
+    /// The index of the first one in the plan. The others follow it.
+    pub first: usize,
+    /// The frames, this one among them, in which their pages are drawn; at least 1.
+    pub frames: u32,
 }
 
 /// The grid of one projector of a light.
@@ -269,7 +283,9 @@ impl Paging {
             map.error = MapError::new([error; 2], error);
             map.check_finite(index)?;
         }
-        plan.paging = Some(Self { camera: *camera, error, bias: 0.0, budget, grids, levels });
+        let coming = None;
+        plan.paging =
+            Some(Self { camera: *camera, error, bias: 0.0, budget, grids, levels, coming });
         Ok(())
     }
 }
@@ -280,12 +296,10 @@ impl Grid {
         self.first_level + (self.maps.len() / self.slabs) as i32 - 1
     }
 
-    /// Whether an address stands for the same page in both grids, whichever levels they have: what
-    /// was drawn for one plan then serves the other.
+    /// Whether an address stands for the same page in both grids, whichever levels they have and
+    /// whichever light of its plan theirs is: what was drawn for one plan then serves the other.
     pub fn has_pages_of(&self, other: &Self) -> bool {
-        let Self { light, side, maps: _, first_level: _, slabs, projection } = self;
-        (light, side, slabs, projection)
-            == (&other.light, &other.side, &other.slabs, &other.projection)
+        (self.slabs, &self.projection) == (other.slabs, &other.projection)
     }
 
     /// The slab of a level `levels_coarser` levels coarser that holds a slab.

@@ -63,6 +63,9 @@ pub(crate) struct Frame {
     pub(crate) groups: [u32; 2],
     pub(crate) stamp: u32,
     pub(crate) births: u32,
+    pub(crate) first_coming: u32,
+    pub(crate) frames_left: u32,
+    pub(crate) padding: [u32; 2],
 }
 
 /// `ShadowPageView`.
@@ -95,11 +98,12 @@ pub(crate) struct Pool {
 }
 
 /// Words of the state of all pages, and the places in it: see `wgsl/page_types.wesl`.
-pub(crate) const STATE_WORDS: usize = 7;
+pub(crate) const STATE_WORDS: usize = 8;
 pub(crate) const BIAS: usize = 3;
 pub(crate) const MISSING: usize = 4;
 pub(crate) const FRESH: usize = 5;
 pub(crate) const USED: usize = 6;
+pub(crate) const WAITING: usize = 7;
 
 /// Words of the table's head.
 pub(crate) const TABLE_HEAD: u32 = 8;
@@ -144,16 +148,26 @@ pub(crate) fn levels(paging: &Paging) -> (Vec<Level>, u32) {
     (levels, table)
 }
 
-/// For each map of a plan the first map of the same level in the next plan, whose grids are the same
-/// but for their levels; `EMPTY` if that has no such level.
+/// For each map of a plan the first map of the same level in the next plan, in the grid that has the
+/// same pages; `EMPTY` if there is none.
 pub(crate) fn levels_now(before: &[Grid], now: &[Grid]) -> Vec<u32> {
     let mut maps = Vec::new();
-    for (before, now) in before.iter().zip(now) {
-        for offset in 0..before.maps.len() {
-            let level = before.first_level + (offset / before.slabs) as i32;
-            let is_there = (now.first_level..=now.last_level()).contains(&level);
-            let first = now.maps.start as i32 + (level - now.first_level) * now.slabs as i32;
-            maps.push(if is_there { first as u32 } else { EMPTY });
+    let mut is_taken = vec![false; now.len()];
+    for grid in before {
+        // Lights that are alike have a grid each.
+        let is_next = |&i: &usize| !is_taken[i] && now[i].has_pages_of(grid);
+        let next = (0..now.len()).find(is_next);
+        if let Some(next) = next {
+            is_taken[next] = true;
+        }
+        for offset in 0..grid.maps.len() {
+            let level = grid.first_level + (offset / grid.slabs) as i32;
+            let first = next.map(|next| &now[next]).and_then(|now| {
+                let is_there = (now.first_level..=now.last_level()).contains(&level);
+                let offset = (level - now.first_level) * now.slabs as i32;
+                is_there.then_some((now.maps.start as i32 + offset) as u32)
+            });
+            maps.push(first.unwrap_or(EMPTY));
         }
     }
     maps

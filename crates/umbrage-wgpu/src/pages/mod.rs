@@ -54,6 +54,8 @@ pub struct PageCounts {
     pub wanted: u32,
     /// Pages of these that had no room, so that coarser ones were looked up.
     pub missing: u32,
+    /// Pages of [lights to come](umbrage::paged::AgingLights) that were left for later frames.
+    pub waiting: u32,
     /// Pages that were drawn, because they were new or because casters had moved.
     pub drawn: u32,
     /// The pages that there is room for.

@@ -48,6 +48,8 @@ pub(crate) struct Pages {
     key: Option<Key>,
     held: Option<Held>,
     levels: Vec<Level>,
+    /// The grids of the frame that was prepared last.
+    grids: Vec<Grid>,
     /// The places that plans without a budget have, once they have needed more than expected.
     grown: Option<u32>,
     /// The bind groups of `held`; `None` if a buffer was replaced.
@@ -64,29 +66,12 @@ pub(crate) struct Pages {
     counts: Option<PageCounts>,
 }
 
-/// What the table of pages depends on.
-#[derive(Clone, Debug, PartialEq)]
+/// What the sizes of buffers depend on.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Key {
-    grids: Vec<Grid>,
-    sides: Vec<u32>,
     places: u32,
-}
-
-impl Key {
-    fn new(paging: &Paging, places: u32) -> Self {
-        let sides = paging.levels.iter().map(|level| level.side).collect();
-        Self { grids: paging.grids.clone(), sides, places }
-    }
-
-    /// Whether pages of the one are pages of the other: whether lights and room are the same, though
-    /// levels and windows may differ, as with the camera's range of distances, its field of view or
-    /// the picture's size.
-    fn is_of_same_pages(&self, other: &Self) -> bool {
-        let mut pairs = self.grids.iter().zip(&other.grids);
-        self.places == other.places
-            && self.grids.len() == other.grids.len()
-            && pairs.all(|(grid, other)| grid.has_pages_of(other))
-    }
+    levels: usize,
+    table_words: u32,
 }
 
 /// Counts that are on their way.
@@ -173,6 +158,7 @@ impl Pages {
             key: None,
             held: None,
             levels: Vec::new(),
+            grids: Vec::new(),
             grown: None,
             groups: None,
             frame: 0,
@@ -276,8 +262,8 @@ impl Pages {
             let pending = Pending { number: self.encoded, ..held.pending };
             readback.send(encoder, &held.state, pending);
         }
-        if let (Some(held), Some(key)) = (&mut self.held, &self.key) {
-            held.entered.clone_from(&key.grids);
+        if let Some(held) = &mut self.held {
+            held.entered.clone_from(&self.grids);
         }
     }
 
@@ -330,6 +316,7 @@ impl Pages {
                 let now = PageCounts {
                     wanted: words[data::USED],
                     missing: words[data::MISSING],
+                    waiting: words[data::WAITING],
                     drawn: words[data::FRESH],
                     room: pending.room,
                     bias,
@@ -348,7 +335,7 @@ impl Pages {
 }
 
 impl Shadows {
-    /// Uploads a plan's pages, for which the pool is made anew if its grids have changed.
+    /// Uploads a plan's pages, for which the pool is made anew if it has another number of places.
     pub(super) fn upload_pages(
         &mut self,
         device: &Device,
@@ -385,16 +372,18 @@ impl Shadows {
         };
         let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
         pages.levels = levels;
-        let key = Key::new(paging, places);
-        let is_same = pages.key.as_ref().is_some_and(|before| before.is_of_same_pages(&key));
+        pages.grids.clone_from(&paging.grids);
+        let key = Key { places, levels: pages.levels.len(), table_words };
+        let before = pages.key.replace(key);
+        // Pages of another plan's grids are given up when the frame begins.
+        let is_same = before.is_some_and(|before| before.places == places);
         if !is_same {
             pages.make(device, queue, places);
         }
-        if !is_same || pages.key.as_ref() != Some(&key) {
+        if before != Some(key) {
             pages.make_tables(device, table_words, places);
             rebind = true;
         }
-        pages.key = Some(key);
         let entered = pages.held.as_ref().map_or(&[][..], |held| &held.entered);
         let levels_now = data::levels_now(entered, &paging.grids);
         pages.hold(device, touched.len(), levels_now.len());
@@ -428,6 +417,13 @@ impl Shadows {
             error: paging.error as f32,
             has_budget: paging.budget.is_some(),
         };
+        let (first_coming, frames_left) = match paging.coming {
+            Some(coming) => {
+                let light = plan.lights.get(coming.first);
+                (light.map_or(plan.maps.len(), |light| light.maps.start), coming.frames.max(1))
+            }
+            None => (plan.maps.len(), 1),
+        };
         let shared = data::Frame {
             frame: pages.frame,
             places,
@@ -440,6 +436,9 @@ impl Shadows {
             groups: pages.workgroups,
             stamp: STAMPS.wrapping_mul(pages.frame),
             births: table_words,
+            first_coming: first_coming as u32,
+            frames_left,
+            padding: [0; 2],
         };
         let view = data::View {
             base: projection.base as f32,
