@@ -7,10 +7,11 @@ use crate::setup::{Chosen, announce, choose, open_scene, tell_chosen, tell_detai
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::time::Instant;
+use umbrage::paged::AgingLights;
 use umbrage::{Bounds, Camera, Plan, Planner};
 use umbrage_lab::{
     Bencher, Costs, Detail, Executors, NamedTechnique, Progress, Receivers, RenderScene, casters,
-    milliseconds, plan, plan_with, planner,
+    milliseconds, plan, plan_aging, planner, turned,
 };
 use umbrage_measure::{LightInfo, View};
 use umbrage_scene::{Scene, SceneCamera};
@@ -28,6 +29,10 @@ struct BenchJson {
     still: bool,
     /// The speed of the camera, m/s; `null` if it stands still.
     walk: Option<f64>,
+    /// The speed at which the light turns, degrees a second; `null` if it does not.
+    turn: Option<f64>,
+    /// The frames over which pages of a light that turns are renewed.
+    renew: u32,
     results: Vec<ResultJson>,
 }
 
@@ -47,6 +52,9 @@ struct ResultJson {
     storage_factor: f64,
     /// Draws and triangles of each map, in a frame that draws all maps.
     map_draws: Vec<DrawnJson>,
+    /// How far the light that is looked up is behind the light, degrees; `null` unless pages are
+    /// renewed over several frames.
+    age_deg: Option<Spread>,
     ms: TimesJson,
     /// What the shadows cost: `plan` + `depth` + `filter` + `shade` − `shade_none` of each frame,
     /// milliseconds.
@@ -87,7 +95,7 @@ struct FirstJson {
     frame: f64,
 }
 
-/// Spread of a time over frames, milliseconds.
+/// Spread of a value over frames.
 #[derive(Clone, Copy, Serialize)]
 struct Spread {
     min: f64,
@@ -116,6 +124,7 @@ struct Contender<'a> {
     technique: &'a NamedTechnique,
     bencher: Bencher<'a>,
     planner: Planner,
+    aging: AgingLights,
     frames: Vec<Frame>,
 }
 
@@ -125,6 +134,8 @@ const WITHOUT_SHADOWS: [&str; 2] = ["none", "log:none"];
 
 /// The times of one frame, milliseconds.
 struct Frame {
+    /// How far the light that is looked up is behind, degrees; `None` if it never is.
+    age_deg: Option<f64>,
     plan: f64,
     costs: Costs,
     frame: f64,
@@ -154,8 +165,9 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
         tell_chosen(&chosen_view, &lights);
         announce(&executors);
     });
-    let contender =
-        |technique| Contender::new(&render_scene, technique, &receivers, camera.image());
+    let contender = |technique| {
+        Contender::new(&render_scene, technique, &receivers, camera.image(), args.renew)
+    };
     let mut contenders = techniques.iter().map(contender).collect::<Result<Vec<_>>>()?;
     let without_shadows = WITHOUT_SHADOWS.map(str::parse::<NamedTechnique>);
     for technique in &without_shadows {
@@ -184,6 +196,8 @@ pub(crate) fn run(args: &bench::Bench, quiet: bool) -> Result<()> {
         frames: args.frames,
         still: args.still,
         walk: args.walk,
+        turn: args.turn,
+        renew: args.renew,
         results,
     };
     if args.json {
@@ -205,28 +219,37 @@ fn take_turns(
     let size = view.camera().image();
     let frames = WARM_UP + args.frames;
     bar.one_part(u64::from(frames) * contenders.len() as u64);
-    let (tracer, light) = (view.tracer(), view.light());
+    let tracer = view.tracer();
     for index in 0..frames {
-        let walked = args.walk.map(|speed| walked(seen_by, size, speed * f64::from(index) / 60.0));
-        let walked = walked.transpose()?;
-        let walked =
-            walked.map(|camera| umbrage_trace::View::new(tracer, camera, *light, 1)).transpose()?;
-        let view = walked.as_ref().unwrap_or(view);
+        let seconds = f64::from(index) / 60.0;
+        let camera = match args.walk {
+            Some(speed) => walked(seen_by, size, speed * seconds)?,
+            None => *view.camera(),
+        };
+        let light = match args.turn {
+            Some(speed) => turned(view.light(), speed * seconds)
+                .context("--turn: a point light has no direction to turn")?,
+            None => *view.light(),
+        };
+        let view = &umbrage_trace::View::new(tracer, camera, light, 1)?;
         // The technique that comes first changes from frame to frame.
         let first = index as usize % contenders.len();
         contenders.rotate_left(first);
         for contender in contenders.iter_mut() {
             bar.stage(&contender.technique.to_string());
-            let Contender { technique, bencher, planner, frames } = contender;
-            if !args.still && args.walk.is_none() {
+            let Contender { technique, bencher, planner, aging, frames } = contender;
+            if !args.are_casters_unmoved() {
                 // As where the camera moves.
                 planner.forget();
             }
             let start = Instant::now();
-            let plan = plan_with(planner, technique, view.camera(), view.light(), bounds)?;
+            aging.advance(&[light])?;
+            let plan = plan_aging(planner, technique, view.camera(), aging, bounds)?;
             let planned = milliseconds(start);
-            let costs = bencher.frame(view, plan, args.still || args.walk.is_some())?;
-            frames.push(Frame { plan: planned, costs, frame: milliseconds(start) });
+            let costs = bencher.frame(view, plan, args.are_casters_unmoved())?;
+            let age = aging.age(0).filter(|_| aging.frames() > 0);
+            let age_deg = age.map(|age| age.angle_rad.to_degrees());
+            frames.push(Frame { age_deg, plan: planned, costs, frame: milliseconds(start) });
             bar.advance(1);
         }
         contenders.rotate_right(first);
@@ -254,9 +277,12 @@ impl<'a> Contender<'a> {
         technique: &'a NamedTechnique,
         receivers: &Receivers,
         size: [u32; 2],
+        renew: u32,
     ) -> Result<Self> {
         let bencher = Bencher::new(scene, technique.technique(), receivers, size)?;
-        Ok(Self { technique, bencher, planner: planner(), frames: Vec::new() })
+        let is_paged = technique.technique().paged_error().is_some();
+        let aging = AgingLights::new(if is_paged { renew } else { 0 });
+        Ok(Self { technique, bencher, planner: planner(), aging, frames: Vec::new() })
     }
 
     fn is_gpu(&self) -> bool {
@@ -268,7 +294,7 @@ impl<'a> Contender<'a> {
         self.frames.iter().skip(WARM_UP as usize)
     }
 
-    /// The spread of a time over the frames that count; `None` if it is not measured.
+    /// The spread of a value over the frames that count; `None` if it is not measured.
     fn spread(&self, value: fn(&Frame) -> Option<f64>) -> Option<Spread> {
         Spread::of(self.counted().filter_map(value))
     }
@@ -306,6 +332,7 @@ impl<'a> Contender<'a> {
             bytes: first.costs.bytes,
             storage_factor: plan.storage_factor(),
             map_draws: map_draws(plan, &first.costs, scene),
+            age_deg: self.spread(|f| f.age_deg),
             ms: TimesJson {
                 plan: self.spread(|f| Some(f.plan)),
                 prepass: self.spread(|f| f.costs.prepass),

@@ -84,10 +84,10 @@ pub use executor::{Executor, RenderScene, Scout, edge_on, make_pages, shadow_opt
 pub use executors::{Backend, Executors, unfit_for_gpu};
 pub use folder::{Contents, ReportFolder, check_file};
 pub use light::{ChosenLight, LightOptions, choose_light};
-pub use motion::{Motion, MovingView, Noise, flicker, noise};
+pub use motion::{Motion, MovingView, Noise, flicker, noise, turned};
 pub use picture::{SeenPage, Shadowed, Shape, Texels};
 pub use planning::{
-    fade, fit_pages, milliseconds, plan, plan_fading, plan_with, planner, seen_points,
+    fade, fit_pages, milliseconds, plan, plan_aging, plan_fading, plan_with, planner, seen_points,
 };
 pub use prepared::PreparedScene;
 pub use presets::{PRESETS, Preset};

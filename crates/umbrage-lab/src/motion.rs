@@ -6,5 +6,5 @@ mod frames;
 mod noise;
 
 pub use flicker::flicker;
-pub use frames::{Motion, MovingView};
+pub use frames::{Motion, MovingView, turned};
 pub use noise::{Noise, noise};

@@ -5,6 +5,7 @@ use crate::technique::{MAX_SIDE, NamedTechnique};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::time::Instant;
+use umbrage::paged::AgingLights;
 use umbrage::{Aabb, Bounds, Camera, Light, Limits, Plan, Planner};
 use umbrage_trace::{Ray, Tracer};
 
@@ -119,6 +120,22 @@ pub fn seen_points(tracer: &Tracer<'_>, camera: &Camera) -> Vec<DVec3> {
     };
     let rows = (0..height).into_par_iter();
     rows.flat_map_iter(|y| (0..width).filter_map(move |x| point(x, y))).collect()
+}
+
+/// Plans a technique for lights whose pages are renewed over several frames, with a planner, which
+/// keeps the plan.
+///
+/// # Errors
+/// As for [`plan`].
+pub fn plan_aging<'a>(
+    planner: &'a mut Planner,
+    technique: &NamedTechnique,
+    camera: &Camera,
+    lights: &AgingLights,
+    bounds: &Bounds<'_>,
+) -> Result<&'a Plan, Error> {
+    let planned = planner.plan_aging(camera, lights, bounds, technique.technique());
+    planned.map_err(|e| technique.blame(e))
 }
 
 /// Runs a job that returns its time in milliseconds, again and again until enough is known.

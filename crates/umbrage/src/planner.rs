@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::error::{Error, check};
 use crate::focus::{Body, CellView, frustum_planes, thickened};
 use crate::light::{Light, Projector};
-use crate::paged::Paging;
+use crate::paged::{AgingLights, Paging};
 use crate::partition::{self, Along};
 use crate::plan::{Fade, Part, Plan, PlannedLight, ShadowMap};
 use crate::resolution::resolutions;
@@ -285,6 +285,27 @@ impl Planner {
         }
         last.view = view;
         Ok(plan)
+    }
+
+    /// Plans for lights some of which may be looked up where they were a while ago. As
+    /// [`plan`](Self::plan) otherwise. Techniques without pages have all lights where they are.
+    ///
+    /// # Errors
+    /// As for [`plan`](Self::plan).
+    pub fn plan_aging(
+        &mut self,
+        camera: &Camera,
+        lights: &AgingLights,
+        bounds: &Bounds<'_>,
+        technique: &Technique,
+    ) -> Result<&Plan, Error> {
+        let has_pages = technique.paged_error().is_some();
+        let planned = if has_pages { lights.planned() } else { lights.now() };
+        self.plan(camera, planned, bounds, technique)?;
+        if let Some(paging) = &mut self.plan.paging {
+            paging.coming = lights.coming();
+        }
+        Ok(&self.plan)
     }
 
     /// Plans the windows of paged maps.

@@ -168,6 +168,33 @@ fn gpus_draw_pages() {
     }
 }
 
+/// Pages of a sun that turns are renewed over several frames, and how far behind it is, is told.
+#[needs(gpu)]
+#[test]
+fn pages_of_a_turning_sun_are_renewed() {
+    let desk = Desk::new();
+    let mut args = vec!["bench", "town:20", "--size", "240x135", "--turn", "0.25", "--json"];
+    args.extend(["--backend", "gpu", "--shadows", "paged", "--shadows", "adaptive"]);
+    let at_once = desk.json(&args);
+    args.extend(["--renew", "10"]);
+    let renewed = desk.json(&args);
+    let share = |bench: &Value| bench["results"][0]["drawn_share"].as_f64().unwrap();
+    let shares = [&at_once, &renewed].map(share);
+    assert!(shares[0] > 0.99 && (0.02..0.1).contains(&shares[1]), "{shares:?}");
+    let turn = |bench: &Value| [bench["turn"].as_f64(), bench["renew"].as_f64()];
+    assert_eq!(turn(&at_once), [Some(0.25), Some(0.0)]);
+    assert_eq!(turn(&renewed), [Some(0.25), Some(10.0)]);
+    assert!(at_once["results"][0]["age_deg"].is_null());
+    assert!(renewed["results"][1]["age_deg"].is_null());
+    let age = renewed["results"][0]["age_deg"]["max"].as_f64().unwrap();
+    // Nineteen frames, about the vertical.
+    assert!(age > 0.0 && age < 19.0 * 0.25 / 60.0, "{age}");
+    for (option, value) in [("--turn", "0"), ("--turn", "400"), ("--renew", "5000")] {
+        let run = desk.run(&["bench", "pole", "--turn=1", &format!("{option}={value}")]);
+        assert!(run.code != 0 && run.stderr.contains(option), "{}", run.stderr);
+    }
+}
+
 #[test]
 fn what_pages_cannot_do_is_said() {
     let desk = Desk::new();

@@ -7,7 +7,7 @@ use crate::receivers::Receivers;
 use crate::technique::NamedTechnique;
 use crate::view::ChosenView;
 use glam::{DQuat, DVec3};
-use umbrage::{Camera, Light, Plan};
+use umbrage::{Camera, Light, Plan, SpotLight};
 use umbrage_trace::View;
 
 /// A motion of the viewer or the light, in steps as small as between the frames of a film.
@@ -77,20 +77,30 @@ impl Motion {
             }
             Self::Away => frame.0.eye += (look_at.eye - look_at.target) * (0.005 * index),
             Self::Sun => {
-                let turn = DQuat::from_rotation_y((0.1 * index).to_radians());
-                match &mut frame.1 {
-                    Light::Directional { direction } => *direction = turn * *direction,
-                    Light::Spot(spot) => spot.direction = turn * spot.direction,
-                    Light::Point(_) => {
-                        let problem =
-                            "a point light has no direction to turn: take dolly, orbit or away";
-                        return Err(Error::field(Field::Motion, problem));
-                    }
-                }
+                frame.1 = turned(&light, 0.1 * index).ok_or_else(|| {
+                    let problem =
+                        "a point light has no direction to turn: take dolly, orbit or away";
+                    Error::field(Field::Motion, problem)
+                })?;
             }
         }
         let camera = frame.0.camera(first.camera.image()).about(Field::Motion)?;
         Ok((camera, frame.1))
+    }
+}
+
+/// Returns a light that has turned by so many degrees about the vertical; `None` for a point light,
+/// which has no direction.
+pub fn turned(light: &Light, degrees: f64) -> Option<Light> {
+    let turn = DQuat::from_rotation_y(degrees.to_radians());
+    match *light {
+        Light::Directional { direction } => {
+            Some(Light::Directional { direction: turn * direction })
+        }
+        Light::Spot(spot) => {
+            Some(Light::Spot(SpotLight { direction: turn * spot.direction, ..spot }))
+        }
+        Light::Point(_) => None,
     }
 }
 

@@ -4,7 +4,7 @@ use crate::parity::{agrees_with, agrees_with_lights, four_lights};
 use crate::{GPU, Set, mesh_inputs, scene};
 use glam::{DQuat, DVec3};
 use umbrage::paged::AgingLights;
-use umbrage::{Aabb, Camera, Light, Plan, Technique};
+use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, Technique};
 use umbrage_clusters::build_finest;
 use umbrage_measure::PARTITIONS;
 use umbrage_render::{FrameTarget, Overlay, Renderer, SceneBuffers, Shading};
@@ -308,29 +308,31 @@ fn a_turning_sun_has_its_pages_renewed_over_frames() {
     let buffers = buffers(&scene);
     let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
     let mut aging = AgingLights::new(FRAMES);
+    let mut planner = Planner::new();
     let mut shares = Vec::new();
     for (frame, camera) in walk(&scene, 4 * FRAMES).enumerate() {
         set.camera = camera;
         let turn = DQuat::from_rotation_y(1e-3 * frame as f64);
         let sun = Light::Directional { direction: turn * direction };
-        let lights = aging.advance(&[sun]).unwrap().to_vec();
-        let mut plan = set.plan(&lights, &technique);
-        aging.mark(&mut plan);
+        aging.advance(&[sun]).unwrap();
+        let bounds = Bounds::default();
+        let plan = planner.plan_aging(&camera, &aging, &bounds, &technique).unwrap();
         let here = camera.eye() + camera.forward() * 3.0;
         let moved = [Aabb::new(here - 0.1, here + 0.1)];
         let moves = (FRAMES as usize..2 * FRAMES as usize).contains(&frame);
         let casters = if moves { Casters::MovedIn(&moved) } else { Casters::Unmoved };
-        renderer.draw_maps(&plan, casters, None).unwrap();
+        renderer.draw_maps(plan, casters, None).unwrap();
         let counts = renderer.page_counts().unwrap();
         assert_eq!((counts.missing, counts.bias), (0, 0.0), "{frame}");
-        let is_last = frame as u32 % FRAMES == 0;
+        let is_last = (frame as u32).is_multiple_of(FRAMES);
         assert!(is_last == (counts.waiting == 0) || frame == 0, "{frame}: {counts:?}");
         shares.push(f64::from(counts.drawn) / f64::from(counts.wanted));
         let age = aging.age(0).unwrap();
         assert!(age.frames < 2 * FRAMES && (age.angle_rad > 0.0) == (frame > 0), "{age:?}");
         if frame as u32 % (FRAMES - 3) == 4 {
             let seen = Drawn::by(&mut renderer, &set.camera, &sun);
-            let (fresh, _) = Drawn::of(&set, &set.plan(&lights[..1], &technique), &technique);
+            let (fresh, _) =
+                Drawn::of(&set, &set.plan(&aging.planned()[..1], &technique), &technique);
             let differ = seen.differ(&fresh);
             assert!(differ * 1000 <= fresh.visibility.len(), "{frame}: {differ} differ");
         }

@@ -3,7 +3,6 @@
 use super::ComingLights;
 use crate::error::Error;
 use crate::light::Light;
-use crate::plan::Plan;
 use glam::DVec3;
 
 /// Lights that move, whose pages are renewed over several frames.
@@ -20,7 +19,7 @@ use glam::DVec3;
 /// ```
 /// # use glam::DVec3;
 /// # use umbrage::{Bounds, Camera, Light, LookAt, Planner, Technique, paged::AgingLights};
-/// # fn main() -> Result<(), umbrage::Error> {
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// # let camera = Camera::look_at(LookAt {
 /// #     eye: DVec3::new(0.0, 2.0, 8.0), target: DVec3::ZERO, up: DVec3::Y, fov_y_rad: 0.9,
 /// #     near: 0.1, far: 200.0, image: [960, 540],
@@ -31,9 +30,8 @@ use glam::DVec3;
 /// for frame in 0..100 {
 ///     let angle = 1e-4 * f64::from(frame);
 ///     let sun = Light::Directional { direction: DVec3::new(angle.sin(), -1.0, angle.cos()) };
-///     let lights = aging.advance(&[sun])?;
-///     let mut plan = planner.plan(&camera, lights, &Bounds::default(), &technique)?.clone();
-///     aging.mark(&mut plan);
+///     aging.advance(&[sun])?;
+///     let plan = planner.plan_aging(&camera, &aging, &Bounds::default(), &technique)?;
 ///     // Draw the plan's pages and look up its light 0.
 /// }
 /// # Ok(()) }
@@ -41,10 +39,12 @@ use glam::DVec3;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AgingLights {
     frames: u32,
-    /// The lights that are looked up, and behind them the next positions of those that have moved.
+    /// Where lights are.
+    now: Vec<Light>,
+    /// Where they are looked up, and behind that the next positions of those that have moved.
     planned: Vec<Light>,
-    /// One for each light that is looked up.
-    clocks: Vec<Clock>,
+    /// For how many frames each light has not been where it is looked up.
+    ages: Vec<u32>,
     /// The lights whose next positions are planned.
     coming: Vec<Coming>,
     /// Frames until these are looked up.
@@ -52,18 +52,11 @@ pub struct AgingLights {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Clock {
-    now: Light,
-    /// For how many frames the light has not been where it is looked up.
-    frames: u32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
 struct Coming {
     /// Index of the light.
     light: usize,
     /// For how many frames the light has not been at its next position any more.
-    frames: u32,
+    age: u32,
 }
 
 /// How far a light that is looked up is behind the light itself.
@@ -97,37 +90,36 @@ impl AgingLights {
         self.left = self.left.min(frames.max(1));
     }
 
-    /// Begins a frame in which these are the lights. Returns those to plan for: first as many as
-    /// there are `lights`, in their order and as they are to be looked up, and behind them the next
-    /// positions of some. If there are other lights than before, or lights of another kind, all are
-    /// looked up where they are.
+    /// Begins a frame in which these are the lights. If there are other lights than before, or lights
+    /// of another kind, all are looked up where they are.
     ///
     /// # Errors
     /// [`Error::Invalid`] for the first light that has a field out of its range. Nothing has changed
     /// then.
-    pub fn advance(&mut self, lights: &[Light]) -> Result<&[Light], Error> {
+    pub fn advance(&mut self, lights: &[Light]) -> Result<(), Error> {
         for light in lights {
             light.checked()?;
         }
-        let is_same_kind = |(clock, light): (&Clock, Light)| {
-            std::mem::discriminant(&clock.now) == std::mem::discriminant(&light)
+        let is_same_kind = |(now, light): (&Light, &Light)| {
+            std::mem::discriminant(now) == std::mem::discriminant(light)
         };
-        let is_same = self.clocks.len() == lights.len()
-            && self.clocks.iter().zip(lights.iter().copied()).all(is_same_kind);
+        let is_same = self.now.len() == lights.len()
+            && self.now.iter().zip(lights).all(is_same_kind)
+            && self.frames > 0;
+        self.now.clear();
         // Directions have unit length from here on.
-        let lights = lights.iter().map_while(|light| light.checked().ok());
-        if !is_same || self.frames == 0 {
-            self.restart(lights);
-            return Ok(&self.planned);
+        self.now.extend(lights.iter().map_while(|light| light.checked().ok()));
+        if !is_same {
+            self.restart();
+            return Ok(());
         }
-        let later = |frames: u32, is_there: bool| if is_there { 0 } else { frames + 1 };
-        for ((clock, now), looked_up) in self.clocks.iter_mut().zip(lights).zip(&self.planned) {
-            *clock = Clock { now, frames: later(clock.frames, *looked_up == now) };
+        let later = |age: u32, is_there: bool| if is_there { 0 } else { age + 1 };
+        for ((age, now), looked_up) in self.ages.iter_mut().zip(&self.now).zip(&self.planned) {
+            *age = later(*age, looked_up == now);
         }
-        let next = &self.planned[self.clocks.len()..];
+        let next = &self.planned[self.now.len()..];
         for (coming, next) in self.coming.iter_mut().zip(next) {
-            let is_there = *next == self.clocks[coming.light].now;
-            coming.frames = later(coming.frames, is_there);
+            coming.age = later(coming.age, *next == self.now[coming.light]);
         }
         if !self.coming.is_empty() {
             self.left -= 1;
@@ -136,29 +128,27 @@ impl AgingLights {
             }
         }
         if self.coming.is_empty() {
-            let lights = 0..self.clocks.len();
-            let moved = lights.filter(|&i| self.planned[i] != self.clocks[i].now);
-            self.coming.extend(moved.map(|light| Coming { light, frames: 0 }));
-            self.planned.extend(self.coming.iter().map(|c| self.clocks[c.light].now));
+            let moved = (0..self.now.len()).filter(|&i| self.planned[i] != self.now[i]);
+            self.coming.extend(moved.map(|light| Coming { light, age: 0 }));
+            self.planned.extend(self.coming.iter().map(|coming| self.now[coming.light]));
             self.left = self.frames;
         }
-        Ok(&self.planned)
+        Ok(())
     }
 
     /// Looks all lights up where they are.
-    fn restart(&mut self, lights: impl Iterator<Item = Light>) {
-        self.clocks.clear();
-        self.clocks.extend(lights.map(|now| Clock { now, frames: 0 }));
-        self.planned.clear();
-        self.planned.extend(self.clocks.iter().map(|clock| clock.now));
+    fn restart(&mut self) {
+        self.planned.clone_from(&self.now);
+        self.ages.clear();
+        self.ages.resize(self.now.len(), 0);
         self.coming.clear();
     }
 
     fn look_coming_up(&mut self) {
-        let count = self.clocks.len();
-        for (k, &Coming { light, frames }) in self.coming.iter().enumerate() {
+        let count = self.now.len();
+        for (k, &Coming { light, age }) in self.coming.iter().enumerate() {
             self.planned[light] = self.planned[count + k];
-            self.clocks[light].frames = frames;
+            self.ages[light] = age;
         }
         self.planned.truncate(count);
         self.coming.clear();
@@ -167,31 +157,38 @@ impl AgingLights {
     /// Looks lights up where they are from the next frame on, whatever they were before. Use it
     /// where a light jumps, and after a cut: all pages are then drawn at once.
     pub fn forget(&mut self) {
-        self.clocks.clear();
+        self.now.clear();
     }
 
-    /// Notes in a plan for the lights of this frame which of them are coming, and how soon. A plan
-    /// without this note has all pages of all lights drawn at once.
-    pub fn mark(&self, plan: &mut Plan) {
-        let coming = ComingLights { first: self.clocks.len(), frames: self.left };
-        if let Some(paging) = &mut plan.paging {
-            paging.coming = Some(coming).filter(|_| !self.coming.is_empty());
-        }
+    /// The lights to plan pages for in this frame: first as many as there are, in their order and as
+    /// they are looked up, and behind them the next positions of some.
+    pub fn planned(&self) -> &[Light] {
+        &self.planned
+    }
+
+    /// The lights where they are, with directions of unit length.
+    pub(crate) fn now(&self) -> &[Light] {
+        &self.now
+    }
+
+    /// Those of the [planned](Self::planned) lights that are looked up in a later frame.
+    pub(crate) fn coming(&self) -> Option<ComingLights> {
+        let coming = ComingLights { first: self.now.len(), frames: self.left };
+        Some(coming).filter(|_| !self.coming.is_empty())
     }
 
     /// How far a light, as it is looked up in this frame, is behind; `None` if there is no such
     /// light.
     pub fn age(&self, light: usize) -> Option<LightAge> {
-        let clock = self.clocks.get(light)?;
-        let looked_up = self.planned.get(light)?;
-        let [now, then] = [&clock.now, looked_up].map(position_and_direction);
+        let (now, looked_up) = (self.now.get(light)?, self.planned.get(light)?);
+        let [now, then] = [now, looked_up].map(position_and_direction);
         let distance = now.0.distance(then.0);
         let angle_rad = match (now.1, then.1) {
             // Unlike the arc cosine, this is precise for small angles too.
             (Some(now), Some(then)) => now.cross(then).length().atan2(now.dot(then)),
             _ => 0.0,
         };
-        Some(LightAge { frames: clock.frames, angle_rad, distance })
+        Some(LightAge { frames: *self.ages.get(light)?, angle_rad, distance })
     }
 }
 
@@ -238,7 +235,8 @@ mod tests {
                 let lights = |[angle_rad, x]: [f64; 2]| {
                     [sun(angle_rad), lamp(x)].map(|light| light.checked().unwrap())
                 };
-                planned.push(aging.advance(&lights(now)).unwrap().to_vec());
+                aging.advance(&lights(now)).unwrap();
+                planned.push(aging.planned().to_vec());
                 let last = planned.len() - 1;
                 let coming = aging.coming.len();
                 prop_assert_eq!(planned[last].len(), 2 + coming);
@@ -270,20 +268,25 @@ mod tests {
     fn lights_that_differ_in_kind_are_looked_up_at_once() {
         let mut aging = AgingLights::new(4);
         assert_eq!(aging.age(0), None);
-        assert_eq!(aging.advance(&[sun(0.0)]).unwrap().len(), 1);
-        assert_eq!(aging.advance(&[sun(0.1)]).unwrap().len(), 2);
-        assert!((aging.age(0).unwrap().angle_rad - 0.1).abs() < 1e-12);
-        assert_eq!(aging.advance(&[lamp(1.0)]).unwrap(), [lamp(1.0)]);
-        assert_eq!(aging.advance(&[lamp(2.0), sun(0.0)]).unwrap().len(), 2);
-        assert_eq!(aging.advance(&[lamp(2.0), sun(0.1)]).unwrap().len(), 3);
+        let mut planned = |lights: &[Light]| {
+            aging.advance(lights).unwrap();
+            aging.planned().to_vec()
+        };
+        assert_eq!(planned(&[sun(0.0)]).len(), 1);
+        assert_eq!(planned(&[sun(0.1)]).len(), 2);
+        assert_eq!(planned(&[lamp(1.0)]), [lamp(1.0)]);
+        assert_eq!(planned(&[lamp(2.0), sun(0.0)]).len(), 2);
+        assert_eq!(planned(&[lamp(2.0), sun(0.1)]).len(), 3);
+        assert!((aging.age(1).unwrap().angle_rad - 0.1).abs() < 1e-12);
         let before = aging.clone();
         let wrong = Light::Directional { direction: DVec3::ZERO };
         assert!(aging.advance(&[lamp(2.0), wrong]).is_err());
         assert_eq!(aging, before);
         aging.forget();
-        assert_eq!(aging.advance(&[lamp(3.0), sun(0.2)]).unwrap().len(), 2);
-        assert_eq!(aging.age(1), Some(LightAge::default()));
+        aging.advance(&[lamp(3.0), sun(0.2)]).unwrap();
+        assert_eq!((aging.planned().len(), aging.age(1)), (2, Some(LightAge::default())));
         aging.set_frames(0);
-        assert_eq!(aging.advance(&[lamp(4.0), sun(0.2)]).unwrap()[0], lamp(4.0));
+        aging.advance(&[lamp(4.0), sun(0.2)]).unwrap();
+        assert_eq!(aging.planned()[0], lamp(4.0));
     }
 }
