@@ -2,7 +2,7 @@
 
 use crate::pipelines::{PipelineParts, Pipelines};
 use crate::renderer::shader_text;
-use crate::scene::{Drawable, Placed, SceneBuffers, anchor};
+use crate::scene::{Drawable, InPages, Placed, SceneBuffers, anchor};
 use crate::view::{Tile, ViewUniform};
 use crate::{Error, Gpu};
 use glam::{DMat4, DVec3};
@@ -106,18 +106,19 @@ fn instances(
     masked: &[usize],
 ) -> Vec<ClusterInstance> {
     let place = |list: &[usize], material| list.iter().position(|&m| m == material);
-    let instance = |drawable: &Drawable| {
+    let instance = |(k, drawable): (usize, &Drawable)| {
+        let is_whole = placed.in_pages(k) != InPages::AsClusters;
         let material = buffers.meshes[drawable.mesh].material;
         let of_casters = place(masked, material).map_or(0, |i| 1 + i as u32);
         let of_picture = place(materials, material).unwrap_or(0) as u32;
         ClusterInstance {
             mesh: drawable.mesh,
             world_from_mesh: drawable.world_from_mesh,
-            caster_batch: drawable.role.casts.then_some(of_casters),
+            caster_batch: (drawable.role.casts && !is_whole).then_some(of_casters),
             seen_batch: drawable.role.is_seen.then_some(of_picture),
         }
     };
-    placed.instances.iter().map(instance).collect()
+    placed.instances.iter().enumerate().map(instance).collect()
 }
 
 /// A mesh's clusters in a space whose origin is `anchor`.

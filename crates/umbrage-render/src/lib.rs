@@ -25,6 +25,7 @@ mod samples;
 mod scene;
 mod timer;
 mod view;
+mod whole;
 
 pub use error::Error;
 pub use frame_target::{FRAME_FORMAT, FrameTarget};

@@ -4,16 +4,19 @@ use crate::frame_target::FrameTarget;
 use crate::renderer::{Drawn, Renderer, Shading, compute_writes, depth_projection, writes};
 use crate::scene::SceneBuffers;
 use crate::timer::{Stage, Timer};
+use crate::whole::{WholeCasters, draw_list};
 use crate::{Error, Gpu};
 use glam::DVec3;
 use umbrage::{Camera, Light, Plan};
 use umbrage_wgpu::{
-    Casters, ClusterCasters, PageCasters, PageCounts, PageFrame, PageTimestamps, Shadows,
+    Casters, ClusterCasters, PageCasters, PageClusters, PageCounts, PageFrame, PageParts,
+    PageTimestamps, Shadows,
 };
 
 /// How a renderer draws pages.
 pub(crate) struct PageDrawing {
     casters: PageCasters,
+    whole: WholeCasters,
     /// The depths of the plan's camera.
     target: Option<FrameTarget>,
     /// Whether the pages were drawn whole, as far as is known.
@@ -49,7 +52,8 @@ impl PageDrawing {
             field: "options.pages",
             problem: "needs a scene with clusters: see `SceneBuffers::make_pages`".into(),
         })??;
-        Ok(Self { casters, target: None, is_complete: true })
+        let whole = WholeCasters::new(gpu.device(), scene, shadows)?;
+        Ok(Self { casters, whole, target: None, is_complete: true })
     }
 }
 
@@ -59,17 +63,9 @@ impl Renderer<'_> {
         &mut self,
         eye: DVec3,
         plan: &Plan,
-        mut casters: Casters<'_>,
+        casters: Casters<'_>,
         mut timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
-        if !self.edge_on.is_empty() {
-            return Err(Error::Invalid {
-                field: "plan",
-                problem: "has pages, into which triangles cannot be drawn whose plane holds a \
-                          lamp: take a technique without pages"
-                    .into(),
-            });
-        }
         let (gpu, scene) = (self.gpu, self.scene);
         let (device, queue) = (gpu.device(), gpu.queue());
         let Some(camera) = plan.paging.as_ref().map(|paging| paging.camera) else {
@@ -81,6 +77,24 @@ impl Renderer<'_> {
                 problem: "must be true for a plan with pages, is false".into(),
             });
         }
+        // Levels of detail stay in the maps of other renderers, so all of the scene is drawn whole.
+        let is_all = scene.has_clusters() && !self.edge_on.is_empty();
+        if !scene.has_clusters() {
+            scene.take_from_clusters(gpu, self.edge_on.iter().map(|e| e.instance))?;
+        }
+        let [mut still, mut moving] = [Vec::new(), Vec::new()];
+        if let Some(drawing) = &mut self.pages {
+            let boxes = [&mut still, &mut moving];
+            drawing.whole.list(scene, plan, &self.edge_on, is_all, boxes);
+        }
+        if let Casters::MovedIn(boxes) = casters {
+            still.extend_from_slice(boxes);
+        }
+        let mut casters = match casters {
+            Casters::Moved => Casters::Moved,
+            Casters::MovedIn(_) | Casters::Unmoved => Casters::MovedIn(&still),
+        };
+        let moving = Casters::MovedIn(&moving);
         let mut trials = 0;
         loop {
             let target = self.draw_depths(&camera, timer.as_deref_mut())?;
@@ -88,15 +102,17 @@ impl Renderer<'_> {
             let is_exact = self.is_exact;
             let Self { shadows, masks, pages, .. } = self;
             let Some(drawing) = pages else { return Ok(Vec::new()) };
-            if drawing.casters.counts(device).is_some_and(|counts| !counts.is_complete) {
-                drawing.is_complete = false;
-            }
+            let is_known = |drawing: &mut PageDrawing| {
+                let counts = drawing.casters.counts(device);
+                counts.is_none_or(|counts| counts.is_complete) && drawing.whole.counts(gpu).1
+            };
+            drawing.is_complete &= is_known(drawing);
             if !std::mem::replace(&mut drawing.is_complete, true) {
                 casters = Casters::Moved;
             }
             let projection = depth_projection(scene, &camera)?;
             let depth = &target.depth;
-            let frame = PageFrame { plan, render_origin: eye, casters, depth, projection };
+            let frame = PageFrame { plan, render_origin: eye, casters, moving, depth, projection };
             let prepared = shadows.prepare_pages(device, queue, &frame)?;
             let mut encoder = device.create_command_encoder(&Default::default());
             let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
@@ -107,14 +123,23 @@ impl Renderer<'_> {
                 choice: compute_writes(&choice),
                 depth: writes(&depth),
             };
+            let PageDrawing { casters: own, whole, .. } = &mut *drawing;
+            let ([still, moves], meshes) = whole.lists();
+            let masks = &*masks;
             let draws = scene.with_page_clusters(|clusters, _| {
-                let mask_of = |batch: u32| {
-                    let material = batch.checked_sub(1).map(|i| clusters.masked[i as usize]);
-                    material.and_then(|m| masks[m].as_ref())
-                };
-                let geometry = &clusters.geometry;
-                let own = &mut drawing.casters;
-                prepared.encode(device, queue, &mut encoder, own, geometry, mask_of, timestamps)
+                let masked = clusters.masked.iter().map(|&material| masks[material].as_ref());
+                let batches: Vec<_> = std::iter::once(None).chain(masked).collect();
+                draw_list(still, scene, meshes, masks, |still| {
+                    draw_list(moves, scene, meshes, masks, |moving| {
+                        let clusters = (!is_all).then_some(PageClusters {
+                            casters: own,
+                            geometry: &clusters.geometry,
+                            masks: &batches,
+                        });
+                        let parts = PageParts { clusters, still, moving };
+                        prepared.encode(device, queue, &mut encoder, parts, timestamps)
+                    })
+                })
             });
             let draws = draws.transpose()?.unwrap_or(0);
             if let Some(timer) = timer.as_deref_mut() {
@@ -134,16 +159,16 @@ impl Renderer<'_> {
                     std::thread::yield_now();
                 }
             }
-            let counts = drawing.casters.counts(device);
             let pages = shadows.page_counts(device);
-            let is_whole = counts.is_none_or(|counts| counts.is_complete);
+            let is_whole = is_known(drawing);
             drawing.is_complete &= is_whole;
             let has_room = pages.is_none_or(|counts| has_room(plan, &counts));
             trials += 1;
             if is_exact && !(is_whole && has_room) && trials < MOST_TRIALS {
                 continue;
             }
-            let triangles = counts.map_or(0, |counts| counts.triangles);
+            let of_clusters = drawing.casters.counts(device).map_or(0, |counts| counts.triangles);
+            let triangles = of_clusters + drawing.whole.counts(gpu).0;
             return Ok(vec![(0, Drawn { draws, triangles })]);
         }
     }

@@ -83,7 +83,7 @@ pub struct Drawn {
     pub triangles: u64,
 }
 
-const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
+pub(crate) const POSITIONS: VertexBufferLayout<'static> = VertexBufferLayout {
     array_stride: size_of::<Vec3>() as u64,
     step_mode: VertexStepMode::Vertex,
     attributes: &[VertexAttribute {

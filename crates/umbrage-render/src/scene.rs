@@ -2,7 +2,7 @@ use crate::clusters::SceneClusters;
 use crate::{Error, Gpu};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{OnceLock, PoisonError, RwLock, RwLockReadGuard};
 use umbrage::{Aabb, Camera};
 use umbrage_clusters::ClusterMesh;
@@ -37,28 +37,42 @@ pub struct SceneBuffers {
     placed: RwLock<Placed>,
 }
 
-/// The error of pages whose casters change their shape.
-fn deformed_error() -> Error {
-    Error::Invalid {
-        field: "meshes",
-        problem: "must keep their shape where pages are drawn, but some are deformed".into(),
-    }
-}
-
 /// Where the instances of a scene are.
 pub(crate) struct Placed {
     /// The instances that have triangles, those of one mesh next to each other.
     pub(crate) instances: Vec<Drawable>,
     /// How often instances changed.
     pub(crate) version: u64,
-    /// Whether a pose has deformed a mesh.
-    is_deformed: bool,
+    /// How each instance casts into pages. What was taken from clusters never goes back.
+    in_pages: Vec<InPages>,
+    /// The instances that a pose has moved or deformed.
+    poses: BTreeMap<usize, Pose>,
     /// For each of the scene's instances, its index in `instances`, if it has triangles.
     drawable_of: Vec<Option<u32>>,
     /// A box around each mesh, in its own space, metres.
     pub(crate) mesh_boxes: Vec<Aabb>,
     /// A box around all instances that are seen, world space, metres.
     bounds: Aabb,
+}
+
+/// How an instance casts into pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum InPages {
+    /// As clusters.
+    AsClusters,
+    /// As a whole mesh that stands still.
+    Whole,
+    /// As a whole mesh that moves.
+    Moving,
+}
+
+/// What poses did to an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pose {
+    /// The box around it before the first of them, world space, metres.
+    pub(crate) rest: Aabb,
+    /// The version of the scene's instances since the last of them.
+    pub(crate) version: u64,
 }
 
 /// An instance of a mesh.
@@ -248,9 +262,6 @@ impl SceneBuffers {
         if self.clusters.is_some() || self.finest.get().is_some() {
             return Ok(());
         }
-        if self.placed().is_deformed {
-            return Err(deformed_error());
-        }
         let finest = finest().map_err(|e| Error::Invalid {
             field: "scene",
             problem: format!("has no clusters to draw pages from: {e}"),
@@ -306,10 +317,6 @@ impl SceneBuffers {
         };
         let deformed: Option<Vec<_>> = moved.meshes.iter().map(of_mesh).collect();
         let Some(deformed) = deformed.filter(|_| is_same) else { return Err(Error::OtherScene) };
-        if self.finest.get().is_some() && !deformed.is_empty() {
-            return Err(deformed_error());
-        }
-        placed.is_deformed |= !deformed.is_empty();
         let stride = self.attribute_layout.array_stride;
         let mut attributes = Vec::new();
         for (i, mesh, range) in deformed {
@@ -323,13 +330,44 @@ impl SceneBuffers {
             let contents = bytemuck::cast_slice(&attributes);
             gpu.queue().write_buffer(&self.attributes, first * stride, contents);
         }
+        let known = placed.poses.len();
         let casters = placed.move_instances(scene, &moved.instances);
-        if let Some(finest) = self.finest.get().filter(|_| !moved.instances.is_empty()) {
-            let mut finest = finest.write().unwrap_or_else(PoisonError::into_inner);
-            finest.place(gpu, self, &placed)?;
+        if placed.poses.len() > known {
+            self.place_finest(gpu, &placed)?;
         }
         gpu.check()?;
         Ok(casters)
+    }
+
+    /// Has instances cast into pages as whole meshes from now on.
+    pub(crate) fn take_from_clusters(
+        &self,
+        gpu: &Gpu,
+        instances: impl Iterator<Item = usize>,
+    ) -> Result<(), Error> {
+        let mut placed = self.placed.write().unwrap_or_else(PoisonError::into_inner);
+        let mut is_new = false;
+        for instance in instances {
+            let drawable = placed.drawable_of.get(instance).copied().flatten();
+            let Some(in_pages) = drawable.map(|k| &mut placed.in_pages[k as usize]) else {
+                continue;
+            };
+            if *in_pages == InPages::AsClusters {
+                *in_pages = InPages::Whole;
+                is_new = true;
+            }
+        }
+        if !is_new {
+            return Ok(());
+        }
+        placed.version += 1;
+        self.place_finest(gpu, &placed)
+    }
+
+    /// Tells the clusters of pages which instances they have.
+    fn place_finest(&self, gpu: &Gpu, placed: &Placed) -> Result<(), Error> {
+        let Some(finest) = self.finest.get() else { return Ok(()) };
+        finest.write().unwrap_or_else(PoisonError::into_inner).place(gpu, self, placed)
     }
 
     /// Where the instances are.
@@ -376,12 +414,13 @@ impl Placed {
             drawable_of[drawable.instance] = Some(k);
         }
         let mut placed = Self {
-            instances,
             version: 0,
-            is_deformed: false,
+            in_pages: vec![InPages::AsClusters; instances.len()],
+            poses: BTreeMap::new(),
             drawable_of,
             mesh_boxes,
             bounds: Aabb::EMPTY,
+            instances,
         };
         placed.find_bounds();
         placed
@@ -391,10 +430,14 @@ impl Placed {
     /// before and after.
     fn move_instances(&mut self, scene: &Scene, moved: &[usize]) -> Vec<Aabb> {
         let mut casters = Vec::new();
+        let version = self.version + 1;
         for &i in moved {
             let Some(k) = self.drawable_of[i] else { continue };
             let new = Drawable::new(scene, i, &self.mesh_boxes);
             let old = std::mem::replace(&mut self.instances[k as usize], new);
+            self.in_pages[k as usize] = InPages::Moving;
+            let first = Pose { rest: old.bounds, version };
+            self.poses.entry(k as usize).or_insert(first).version = version;
             let new = &self.instances[k as usize];
             let casting = [&old, new].into_iter().filter(|drawable| drawable.role.casts);
             casters.extend(casting.map(|drawable| drawable.bounds));
@@ -404,6 +447,16 @@ impl Placed {
             self.find_bounds();
         }
         casters
+    }
+
+    /// How an instance casts into pages.
+    pub(crate) fn in_pages(&self, drawable: usize) -> InPages {
+        self.in_pages[drawable]
+    }
+
+    /// The instances that poses have moved or deformed, by their indices.
+    pub(crate) fn poses(&self) -> impl Iterator<Item = (usize, Pose)> + '_ {
+        self.poses.iter().map(|(&k, &pose)| (k, pose))
     }
 
     fn find_bounds(&mut self) {

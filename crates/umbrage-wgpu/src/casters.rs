@@ -1,4 +1,6 @@
-use crate::{ClusterGeometry, Shadows, data, wgsl};
+use crate::pages::check_pages;
+use crate::pages::meshes::draw_layout as mesh_draw_layout;
+use crate::{ClusterGeometry, Error, Shadows, data, wgsl};
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec4};
 use std::mem::size_of;
@@ -126,16 +128,29 @@ impl MeshCasters {
         page_layout: &BindGroupLayout,
         geometry: &ClusterGeometry,
     ) -> Self {
-        // What lies beside a page is clipped, or else discarded.
-        let discards = !are_inside && !shadows.support().clip_distances;
-        let fragment = match (kind, shadows.caster_needs_fragment()) {
-            (MeshKind::Opaque, false) if !discards => None,
-            (_, false) => Some("shadow_page_clamped_fragment"),
-            (_, true) => Some("shadow_page_fragment"),
-        };
-        let stages = Stages { text, vertex: "shadow_page_vertex", fragment };
+        let stages = Stages::in_pages(shadows, kind, text, are_inside);
         let own = Some(geometry.vertex_layout());
         Self::of_stages(device, shadows, kind, stages, &[], page_layout, own)
+    }
+
+    /// Creates the pipeline that draws [whole meshes into pages](crate::PageMeshes). `buffers` are
+    /// those of [`new`](Self::new), but without the instances' rows.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the shadows have no pages.
+    pub fn for_pages(
+        device: &Device,
+        shadows: &Shadows,
+        kind: MeshKind,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+    ) -> Result<Self, Error> {
+        let pages = check_pages(shadows)?;
+        let (support, filter) = (shadows.support(), &shadows.options().filter);
+        let text = wgsl::page_mesh(support, filter, kind == MeshKind::Masked);
+        let stages = Stages::in_pages(shadows, kind, text, false);
+        let own = mesh_draw_layout(device);
+        let layout = pages.draw_layout();
+        Ok(Self::of_stages(device, shadows, kind, stages, buffers, layout, Some(&own)))
     }
 
     fn of_stages(
@@ -222,6 +237,20 @@ struct Stages {
     text: String,
     vertex: &'static str,
     fragment: Option<&'static str>,
+}
+
+impl Stages {
+    /// The stages that draw casters into pages.
+    fn in_pages(shadows: &Shadows, kind: MeshKind, text: String, are_inside: bool) -> Self {
+        // What lies beside a page is clipped, or else discarded.
+        let discards = !are_inside && !shadows.support().clip_distances;
+        let fragment = match (kind, shadows.caster_needs_fragment()) {
+            (MeshKind::Opaque, false) if !discards => None,
+            (_, false) => Some("shadow_page_clamped_fragment"),
+            (_, true) => Some("shadow_page_fragment"),
+        };
+        Self { text, vertex: "shadow_page_vertex", fragment }
+    }
 }
 
 fn mask_layout(device: &Device) -> BindGroupLayout {

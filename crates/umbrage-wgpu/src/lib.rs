@@ -87,7 +87,10 @@ pub use clusters::{
     ClusterOccluders, ClusterSelection, ClusterSource, ClusterVertices, ClusterView,
 };
 pub use error::Error;
-pub use pages::{PageCasters, PageCounts, PageFrame, PagePool, PageTimestamps, PreparedPages};
+pub use pages::{
+    PageCasters, PageClusters, PageCounts, PageFrame, PageMesh, PageMeshCounts, PageMeshDraw,
+    PageMeshPart, PageMeshPass, PageMeshes, PageParts, PagePool, PageTimestamps, PreparedPages,
+};
 pub use passes::{MapPass, Prepared, Timestamps};
 pub use redraw::Redraw;
 pub use seen::{DepthProjection, SeenReadback};

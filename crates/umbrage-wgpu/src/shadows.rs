@@ -45,6 +45,10 @@ pub struct ShadowOptions {
     /// ([`Layout::Atlas`]), and lookups read [`LookupBuffers::Storage`], whatever else was asked
     /// for. [`Shadows::prepare_pages`] takes such plans, and [`Shadows::prepare`] all others.
     pub pages: bool,
+    /// Whether pages keep casters that stand still apart from those that move
+    /// ([`PageParts::moving`](crate::PageParts::moving)), in a second texture as large as the first.
+    /// Where something moves, what stands still is then copied in place of being drawn again.
+    pub pages_apart: bool,
 }
 
 /// The kind of the buffers from which lookups read lights, maps and planes.
@@ -299,8 +303,7 @@ impl Shadows {
             Some(prefilter) => Some(Prefiltering::new(device, &support, prefilter, &texture)?),
             None => None,
         };
-        let pages =
-            options.pages.then(|| Pages::new(device, &support, &options.filter, &lookup_layout));
+        let pages = options.pages.then(|| Pages::new(device, &support, &options, &lookup_layout));
         let unbound = pages.as_ref().map(|_| Buffers::stand_ins(device));
         let parts = LookupParts {
             view: looked_up(&texture, prefiltering.as_ref()),
@@ -668,19 +671,24 @@ impl Shadows {
                 problem: format!("must be finite, is {render_origin}"),
             });
         }
-        if let Casters::MovedIn(boxes) = casters {
-            let is_sound = |b: &&Aabb| b.is_empty() || is_position(b.min) && is_position(b.max);
-            if let Some(bad) = boxes.iter().find(|b| !is_sound(b)) {
-                return Err(Error::Invalid {
-                    field: "frame.casters",
-                    problem: format!("must lie within 1e12 metres of the origin, is {bad:?}"),
-                });
-            }
-        }
+        check_casters(casters, "frame.casters")?;
         if let Some(map) = plan.maps.iter().position(|m| m.rows != Rows::Even && !m.is_empty()) {
             return Err(Error::LogarithmicRows { map });
         }
         Ok(())
+    }
+}
+
+/// Checks the boxes around casters that moved.
+pub(crate) fn check_casters(casters: Casters<'_>, field: &'static str) -> Result<(), Error> {
+    let Casters::MovedIn(boxes) = casters else { return Ok(()) };
+    let is_sound = |b: &&Aabb| b.is_empty() || is_position(b.min) && is_position(b.max);
+    match boxes.iter().find(|b| !is_sound(b)) {
+        Some(bad) => Err(Error::Invalid {
+            field,
+            problem: format!("must lie within 1e12 metres of the origin, is {bad:?}"),
+        }),
+        None => Ok(()),
     }
 }
 

@@ -120,7 +120,7 @@ pub(crate) fn named(text: &str, name: &str) -> String {
 }
 
 fn lookup_shader(group: u32, options: &ShadowOptions) -> Shader {
-    let ShadowOptions { filter, comparison, layout, buffers, fades, pages } = *options;
+    let ShadowOptions { filter, comparison, layout, buffers, fades, pages, .. } = *options;
     let root = if filter.has_maps() { module!("lookup") } else { module!("lookup_none") };
     let mut shader = Shader::new(root);
     shader.constant("SHADOW_GROUP", group);
@@ -350,20 +350,76 @@ fn page_caster_shader(
     is_masked: bool,
     are_inside: bool,
 ) -> Shader {
-    let root = if is_masked { module!("page_masked") } else { module!("page_opaque") };
+    let root =
+        if is_masked { module!("page_cluster_masked") } else { module!("page_cluster_opaque") };
     let mut shader = Shader::new(root);
+    add_page_stages(&mut shader, support, filter, is_masked, are_inside);
+    if is_masked {
+        add_cluster_uv(&mut shader, layout);
+    }
+    add_cluster_vertex(&mut shader, CLUSTER_GROUP, layout);
+    shader
+}
+
+/// The bind group that tells which instances of whole meshes are drawn into pages.
+pub(crate) const PAGE_MESH_GROUP: u32 = 2;
+
+/// The text of the shader that draws whole meshes into pages, with the pages in bind group 0 and the
+/// mask in bind group 1.
+pub(crate) fn page_mesh(support: &Support, filter: &Filter, is_masked: bool) -> String {
+    page_mesh_shader(support, filter, is_masked).link()
+}
+
+fn page_mesh_shader(support: &Support, filter: &Filter, is_masked: bool) -> Shader {
+    let root = if is_masked { module!("page_mesh_masked") } else { module!("page_mesh_opaque") };
+    let mut shader = Shader::new(root);
+    shader.constant("SHADOW_PAGE_MESH_GROUP", PAGE_MESH_GROUP);
+    add_page_stages(&mut shader, support, filter, is_masked, false);
+    shader.add([module!("mesh"), module!("page_mesh"), module!("page_mesh_types")]);
+    shader
+}
+
+/// The text of the passes that list whole meshes in pages.
+pub(crate) fn page_meshes() -> String {
+    page_meshes_shader().link()
+}
+
+fn page_meshes_shader() -> Shader {
+    let mut shader = Shader::new(module!("page_meshes"));
+    shader.add([module!("maps"), module!("page_mesh_types"), module!("page_types")]);
+    shader
+}
+
+/// The text of the pass that copies the depths of what stands still.
+pub(crate) fn page_copy(filter: &Filter, support: &Support) -> String {
+    page_copy_shader(filter, support).link()
+}
+
+fn page_copy_shader(filter: &Filter, support: &Support) -> Shader {
+    let mut shader = Shader::new(module!("page_copy"));
     add_page_casters(&mut shader, filter, support);
+    shader
+}
+
+/// Adds the fragment stages of casters in pages, and what their vertex stages share.
+fn add_page_stages(
+    shader: &mut Shader,
+    support: &Support,
+    filter: &Filter,
+    is_masked: bool,
+    are_inside: bool,
+) {
+    add_page_casters(shader, filter, support);
     shader.add([match (are_inside, support.clip_distances) {
         (true, _) => module!("page_sides/none"),
         (false, true) => generated::clipped_page_sides(),
         (false, false) => module!("page_sides/discarded"),
     }]);
     if is_masked {
-        shader.add([module!("holes")]);
-        add_cluster_uv(&mut shader, layout);
+        shader.add([module!("page_masked"), module!("holes")]);
+    } else {
+        shader.add([module!("page_opaque")]);
     }
-    add_cluster_vertex(&mut shader, CLUSTER_GROUP, layout);
-    shader
 }
 
 fn add_page_casters(shader: &mut Shader, filter: &Filter, support: &Support) {

@@ -5,9 +5,9 @@ use crate::{GPU, Set, mesh_inputs, scene};
 use glam::{DQuat, DVec3};
 use umbrage::paged::AgingLights;
 use umbrage::{Aabb, Bounds, Camera, Light, Plan, Planner, Technique};
-use umbrage_clusters::build_finest;
+use umbrage_clusters::{build_all, build_finest};
 use umbrage_measure::PARTITIONS;
-use umbrage_render::{FrameTarget, Overlay, Renderer, SceneBuffers, Shading};
+use umbrage_render::{EdgeOn, FrameTarget, Overlay, Renderer, SceneBuffers, Shading};
 use umbrage_scene::{Lens, Scene};
 use umbrage_testing::needs;
 use umbrage_trace::View;
@@ -149,7 +149,7 @@ impl Drawn {
     }
 }
 
-fn buffers(scene: &Scene) -> SceneBuffers {
+pub(crate) fn buffers(scene: &Scene) -> SceneBuffers {
     let buffers = SceneBuffers::new(&GPU, scene, false).unwrap();
     let finest = || build_finest(&mesh_inputs(scene));
     buffers.make_pages(&GPU, scene, finest).unwrap();
@@ -340,6 +340,33 @@ fn a_turning_sun_has_its_pages_renewed_over_frames() {
     // The pool grows in the first frames that want the pages of two suns.
     let most = shares[2..].iter().copied().fold(0.0, f64::max);
     assert!(most < 1.5 / f64::from(FRAMES), "{shares:?}");
+}
+
+/// Whole meshes cast into pages what clusters do, where these cannot be told which instances to leave
+/// out. There are more meshes in pages than there is room for at first.
+#[needs(gpu)]
+#[test]
+fn whole_meshes_are_drawn_in_place_of_clusters() {
+    let scene = scene("town:4");
+    let set = Set::new(&scene, IMAGE);
+    let technique: Technique = "paged(error=0.25):pcf3".parse().unwrap();
+    let plan = set.plan(&[set.light()], &technique);
+    let clusters = build_all(&mesh_inputs(&scene), &|_| {}).unwrap();
+    let buffers = SceneBuffers::with_clusters(&GPU, &scene, false, Some(&clusters)).unwrap();
+    let mut renderer = Renderer::new(&GPU, &buffers, &options(&technique)).unwrap();
+    renderer.draw_full_detail().unwrap();
+    // A triangle of a light that the plan does not have.
+    renderer.leave_out(vec![EdgeOn { light: 1, instance: 0, triangle: 0 }]);
+    let drawn = renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+    let instances = scene.instances.len() as u32;
+    let triangles: usize =
+        scene.instances.iter().map(|i| scene.meshes[i.mesh].triangles.len()).sum();
+    assert!(drawn[0].1.draws < instances, "{drawn:?} of {instances} instances");
+    assert!(drawn[0].1.triangles > 2 * triangles as u64, "{drawn:?} of {triangles} triangles");
+    let whole = Drawn::by(&mut renderer, &set.camera, &set.light());
+    let (expected, _) = Drawn::of(&set, &plan, &technique);
+    let differ = whole.differ(&expected);
+    assert!(differ * 1000 <= expected.visibility.len(), "{differ} differ");
 }
 
 /// The overlay shows levels and borders, and for a while which pages are new; the pool's picture has

@@ -1,5 +1,6 @@
 //! The pictures of the GPU against those of the reference, which casts a ray through every texel.
 
+use crate::pages::buffers as page_buffers;
 use crate::{GPU, Set, mesh_inputs, scene};
 use glam::{DAffine3, DVec3, Quat, Vec2, Vec3, Vec4};
 use umbrage::visibility::statistic::{Csm, Esm, Evsm, Msm, Statistic, Vsm};
@@ -431,7 +432,6 @@ fn no_shadows() {
 #[needs(gpu)]
 #[test]
 fn a_lamp_lies_in_a_roof() {
-    let technique: Technique = "uniform@512".parse().unwrap();
     for (tilt, turn) in [(0.0, 0.0), (0.3, 0.4), (-0.25, 1.1), (0.2, -2.3), (-0.1, 2.9)] {
         let mut scene = scene("pole");
         let lamp = Vec3::new(1.5, 5.5, 1.0);
@@ -461,8 +461,6 @@ fn a_lamp_lies_in_a_roof() {
         .unwrap();
         let position = lamp.as_dvec3();
         let light = Light::Point(PointLight { position, near: 0.01, range: 60.0 });
-        let plan = set.plan(&[light], &technique);
-        let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
         let edge_on = set.tracer.edge_on_at(position).into_iter().map(|p| EdgeOn {
             light: 0,
             instance: p.instance as usize,
@@ -470,20 +468,29 @@ fn a_lamp_lies_in_a_roof() {
         });
         let edge_on: Vec<EdgeOn> = edge_on.collect();
         assert!(!edge_on.is_empty(), "tilted by {tilt}, turned by {turn}");
-        let buffers = SceneBuffers::new(&GPU, set.scene, false).unwrap();
-        let mut renderer = Renderer::new(&GPU, &buffers, &ShadowOptions::default()).unwrap();
-        renderer.leave_out(edge_on);
-        renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
-        let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
-        let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
-        let difference = compare(&set, &plan, (0, &light), &samples, &reference);
-        check(&format!("roof tilted by {tilt}, turned by {turn}"), &technique, &difference);
-        let view = View::new(&set.tracer, set.camera, light, 1).unwrap();
-        let band = view.band(0..IMAGE[1], &|_| {});
-        let truth = band.map(|s| s.is_facing.then(|| view.truth(s)), &|_| {});
-        let pairs = truth.iter().zip(&samples).filter_map(|(t, s)| Some((t.as_ref()?, s)));
-        let wrong = pairs.filter(|(t, s)| (**t - s.visibility).abs() > 0.5).count();
-        assert!(wrong * 100 < difference.counted, "{wrong} of {} wrong", difference.counted);
+        for text in ["uniform@512", "paged"] {
+            let technique: Technique = text.parse().unwrap();
+            let plan = set.plan(&[light], &technique);
+            let reference = Reference::render(&set.tracer, &plan, &|_| {}).unwrap();
+            let buffers = page_buffers(set.scene);
+            let pages = plan.paging.is_some();
+            let options = ShadowOptions { pages, ..ShadowOptions::default() };
+            let mut renderer = Renderer::new(&GPU, &buffers, &options).unwrap();
+            renderer.leave_out(edge_on.clone());
+            renderer.draw_maps(&plan, Casters::Unmoved, None).unwrap();
+            let shading = Shading { camera: &set.camera, light: &light, light_index: 0 };
+            let samples = renderer.samples(&shading, 0..IMAGE[1], 1, true).unwrap();
+            let difference = compare(&set, &plan, (0, &light), &samples, &reference);
+            let what = format!("roof tilted by {tilt}, turned by {turn}");
+            check(&what, &technique, &difference);
+            let view = View::new(&set.tracer, set.camera, light, 1).unwrap();
+            let band = view.band(0..IMAGE[1], &|_| {});
+            let truth = band.map(|s| s.is_facing.then(|| view.truth(s)), &|_| {});
+            let pairs = truth.iter().zip(&samples).filter_map(|(t, s)| Some((t.as_ref()?, s)));
+            let wrong = pairs.filter(|(t, s)| (**t - s.visibility).abs() > 0.5).count();
+            let counted = difference.counted;
+            assert!(wrong * 100 < counted, "{what}, {text}: {wrong} of {counted} wrong");
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Poses that reach scenes on the GPU, against the same scenes uploaded afresh.
 
+use crate::pages::buffers as page_buffers;
 use crate::parity::agrees_with;
 use crate::pictures::read;
 use crate::{GPU, Set};
@@ -192,6 +193,59 @@ fn a_posed_scene_is_drawn_as_if_it_were_uploaded_so() {
     }
 }
 
+/// Pages follow poses without being told. Where what moves is kept apart, what stands still is drawn
+/// once.
+#[needs(gpu)]
+#[test]
+fn pages_follow_poses() {
+    let rest = puppets();
+    let set = Set::new(&rest, [320, 180]);
+    for (text, pages_apart) in [("paged", false), ("paged", true), ("paged:pcf3", true)] {
+        let technique: Technique = text.parse().unwrap();
+        let filter = technique.filter;
+        let options =
+            ShadowOptions { filter, pages: true, pages_apart, ..ShadowOptions::default() };
+        let plan = set.plan(&[set.light()], &technique);
+        let mut posed = rest.clone();
+        let buffers = page_buffers(&posed);
+        let mut renderer = Renderer::new(&GPU, &buffers, &options).unwrap();
+        let (still, _) = frame(&mut renderer, &set, &plan, Casters::Moved);
+        for (k, seconds) in [0.3, 1.0, 0.9, 0.0].into_iter().enumerate() {
+            let moved = posed.pose(Some(0), seconds);
+            buffers.pose(&GPU, &posed, &moved).unwrap();
+            let what = format!("{technique} at {seconds} s, apart: {pages_apart}");
+            let (picture, _) = frame(&mut renderer, &set, &plan, Casters::Unmoved);
+            let counts = renderer.page_counts().unwrap();
+            assert!(0 < counts.drawn && counts.drawn < counts.wanted, "{what}: {counts:?}");
+            // Where something moves for the first time, it was among what stands still. And pages
+            // are new that only what moved is seen in.
+            assert!(
+                if pages_apart && k > 0 {
+                    counts.apart * 4 > counts.drawn * 3
+                } else {
+                    counts.apart * 4 < counts.drawn
+                },
+                "{what}: {counts:?}"
+            );
+            let (again, _) = frame(&mut renderer, &set, &plan, Casters::Unmoved);
+            assert_eq!(renderer.page_counts().unwrap().drawn, 0, "{what}");
+            assert!(again == picture, "{what}: changes by itself");
+            let (whole, _) = frame(&mut renderer, &set, &plan, Casters::Moved);
+            assert!(picture == whole, "{what}: parts and whole differ");
+            let afresh = page_buffers(&posed);
+            let mut other = Renderer::new(&GPU, &afresh, &options).unwrap();
+            let (expected, _) = frame(&mut other, &set, &plan, Casters::Moved);
+            // Clusters and whole meshes round differently.
+            let pairs = picture.iter().zip(&expected);
+            let differ = pairs.filter(|(a, b)| a != b).count();
+            assert!(differ * 1000 <= picture.len(), "{what}: {differ} pixels differ");
+            let pairs = picture.iter().zip(&still);
+            let moved = pairs.filter(|(a, b)| a != b).count();
+            assert_eq!(moved * 1000 <= picture.len(), seconds == 0.0, "{what}: {moved} pixels");
+        }
+    }
+}
+
 /// Rays see the same pose.
 #[needs(gpu)]
 #[test]
@@ -200,8 +254,11 @@ fn a_posed_scene_has_the_shadows_of_the_reference() {
     for seconds in [0.4, 1.0] {
         scene.pose(Some(0), seconds);
         let set = Set::new(&scene, [240, 135]);
-        for (text, filter) in [("uniform@512", Filter::Hard), ("lispsm@512", Filter::Pcf { n: 3 })]
-        {
+        for (text, filter) in [
+            ("uniform@512", Filter::Hard),
+            ("lispsm@512", Filter::Pcf { n: 3 }),
+            ("paged", Filter::Hard),
+        ] {
             let technique = Technique { filter, ..text.parse().unwrap() };
             agrees_with(&format!("puppets at {seconds} s"), &set, &technique);
         }

@@ -263,12 +263,16 @@ impl<'a> Artist<'a> {
         let target = easel.targets.free(gpu, request.camera.image())?;
         make_pages(gpu, buffers, tracer.scene(), technique.technique())
             .map_err(|e| e.to_string())?;
-        let (brush, mut timer) = easel.brush(gpu, buffers, technique, plan.fade.is_some())?;
+        let mut options = shadow_options(technique.technique(), plan.fade.is_some());
+        options.pages_apart = options.pages && !tracer.scene().animations.clips().is_empty();
+        let (brush, mut timer) = easel.brush(gpu, buffers, options)?;
         let Brush { renderer, moved, .. } = brush;
         let text = |e: umbrage_render::Error| e.to_string();
         // The rays know the scene at rest.
         renderer.leave_out(if posed.is_some() { Vec::new() } else { edge_on(&plan, tracer) });
         let casters = match moved.as_deref() {
+            // Of pages a renderer knows itself what poses moved.
+            _ if plan.paging.is_some() => Casters::Unmoved,
             None => Casters::Moved,
             Some([]) => Casters::Unmoved,
             Some(moved) => Casters::MovedIn(moved),
@@ -420,15 +424,13 @@ impl<'a> Easel<'a> {
         plan_with(&mut self.planner, technique, camera, light, bounds).cloned()
     }
 
-    /// The renderer of a technique, and the timer of its frames.
+    /// The renderer with these options, and the timer of its frames.
     fn brush(
         &mut self,
         gpu: &'a Gpu,
         buffers: &'a SceneBuffers,
-        technique: &NamedTechnique,
-        fades: bool,
+        options: ShadowOptions,
     ) -> Result<(&mut Brush<'a>, Option<&mut Timer>), String> {
-        let options = shadow_options(technique.technique(), fades);
         let brush = match self.renderers.iter().position(|brush| brush.options == options) {
             Some(known) => self.renderers.remove(known),
             None => {

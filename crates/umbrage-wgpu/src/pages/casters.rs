@@ -1,5 +1,5 @@
-use super::Pages;
 use super::pool::triangles_pipeline;
+use super::{Pages, check_pages};
 use crate::clusters::{ForPages, check_share};
 use crate::{
     ClusterCounts, ClusterGeometry, ClusterSelection, ClusterView, Error, Mask, MeshCasters,
@@ -40,12 +40,7 @@ impl PageCasters {
         share: f32,
     ) -> Result<Self, Error> {
         check_share(shadows, share)?;
-        let Some(pages) = &shadows.pages else {
-            return Err(Error::Invalid {
-                field: "options.pages",
-                problem: "must be true for shadows whose pages are drawn, is false".into(),
-            });
-        };
+        let pages = check_pages(shadows)?;
         let (support, filter) = (shadows.support(), &shadows.options().filter);
         let casters = |are_inside| {
             [MeshKind::Opaque, MeshKind::Masked].map(|kind| {
@@ -89,13 +84,10 @@ impl PageCasters {
     }
 
     /// Draws what was chosen, into a pass whose pages are bound. Returns the number of draws.
-    pub(super) fn draw<'a>(
-        &self,
-        pass: &mut RenderPass<'_>,
-        mask_of: impl Fn(u32) -> Option<&'a BindGroup>,
-    ) -> u32 {
+    pub(super) fn draw(&self, pass: &mut RenderPass<'_>, masks: &[Option<&BindGroup>]) -> u32 {
+        let mask_of = |batch: u32| masks.get(batch as usize).copied().flatten();
         let count = self.caster_batches;
-        let inside = self.selection.draw_batches(pass, self.inside.each_ref(), 0..count, &mask_of);
+        let inside = self.selection.draw_batches(pass, self.inside.each_ref(), 0..count, mask_of);
         let of_batch = |draw| mask_of(draw - count);
         let across = count..2 * count;
         inside + self.selection.draw_batches(pass, self.across.each_ref(), across, of_batch)

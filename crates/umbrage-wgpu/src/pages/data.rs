@@ -2,7 +2,7 @@
 //! its comment names.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 use umbrage::paged::{FALLBACK_LEVELS, Grid, PAGE_TEXELS, Paging};
 use umbrage::{Aabb, Camera, ShadowMap, ViewRay};
 
@@ -31,8 +31,51 @@ pub(crate) struct PlacedPage {
     pub(crate) index: [i32; 2],
     pub(crate) slot: u32,
     pub(crate) wanted: u32,
-    pub(crate) is_stale: u32,
+    pub(crate) stale: u32,
     pub(crate) padding: u32,
+}
+
+/// `SHADOW_PAGE_STALE`, `SHADOW_PAGE_MOVED` and `SHADOW_PAGE_SHOWN` of `wgsl/page_types.wesl`.
+pub(crate) const STALE: u32 = 1;
+pub(crate) const MOVED: u32 = 2;
+pub(crate) const SHOWN: u32 = 8;
+
+/// `SHADOW_PAGE_STILL` of `wgsl/page_types.wesl`.
+pub(crate) const STILL: u32 = 1 << 31;
+
+/// `ShadowPageMeshing`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Meshing {
+    pub(crate) meshes: u32,
+    pub(crate) draws: u32,
+    pub(crate) maps: u32,
+    pub(crate) room: u32,
+    pub(crate) reach: f32,
+    pub(crate) is_still: u32,
+    pub(crate) stride: u32,
+}
+
+/// `ShadowPageMesh`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct PageMesh {
+    pub(crate) render_from_mesh: [Vec4; 3],
+    pub(crate) low: Vec3,
+    pub(crate) draw: u32,
+    pub(crate) high: Vec3,
+    pub(crate) padding: u32,
+}
+
+/// `ShadowPageMeshDraw`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct MeshDraw {
+    pub(crate) first_index: u32,
+    pub(crate) index_count: u32,
+    pub(crate) base_vertex: i32,
+    pub(crate) first_map: u32,
+    pub(crate) end_map: u32,
 }
 
 /// `SHADOW_PAGE_EMPTY` of `wgsl/page_types.wesl`.
@@ -46,6 +89,7 @@ pub(crate) struct FreshPage {
     pub(crate) map: u32,
     pub(crate) page: u32,
     pub(crate) slot: u32,
+    pub(crate) is_still: u32,
 }
 
 /// `ShadowPageFrame`.
@@ -56,16 +100,17 @@ pub(crate) struct Frame {
     pub(crate) places: u32,
     pub(crate) room: u32,
     pub(crate) boxes: u32,
+    pub(crate) still_boxes: u32,
     pub(crate) error: f32,
     pub(crate) least_bias: f32,
-    pub(crate) are_all_stale: u32,
-    pub(crate) maps: u32,
+    pub(crate) all_stale: u32,
     pub(crate) groups: [u32; 2],
+    pub(crate) maps: u32,
     pub(crate) stamp: u32,
     pub(crate) births: u32,
     pub(crate) first_coming: u32,
     pub(crate) frames_left: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) padding: u32,
 }
 
 /// `ShadowPageView`.
@@ -98,12 +143,13 @@ pub(crate) struct Pool {
 }
 
 /// Words of the state of all pages, and the places in it: see `wgsl/page_types.wesl`.
-pub(crate) const STATE_WORDS: usize = 8;
+pub(crate) const STATE_WORDS: usize = 9;
 pub(crate) const BIAS: usize = 3;
 pub(crate) const MISSING: usize = 4;
 pub(crate) const FRESH: usize = 5;
 pub(crate) const USED: usize = 6;
 pub(crate) const WAITING: usize = 7;
+pub(crate) const APART: usize = 8;
 
 /// Words of the table's head.
 pub(crate) const TABLE_HEAD: u32 = 8;

@@ -2,18 +2,22 @@
 
 mod casters;
 pub(crate) mod data;
+pub(crate) mod meshes;
 mod pool;
 
 use crate::clusters::PagesOfView;
+use crate::passes::part;
 use crate::seen::check_depths;
-use crate::shadows::{Casters, Shadows};
+use crate::shadows::{Casters, Shadows, check_casters};
 use crate::{ClusterGeometry, ClusterView, DepthProjection, Error};
 pub use casters::PageCasters;
 use glam::DVec3;
+use meshes::MeshesIn;
+pub use meshes::{PageMesh, PageMeshCounts, PageMeshDraw, PageMeshPass, PageMeshes};
 pub(crate) use pool::Pages;
 use umbrage::Plan;
 use wgpu::{
-    BindGroup, Buffer, CommandEncoder, ComputePassTimestampWrites, Device, Queue,
+    BindGroup, Buffer, CommandEncoder, ComputePassTimestampWrites, Device, Queue, RenderPass,
     RenderPassTimestampWrites, TextureView,
 };
 
@@ -25,9 +29,13 @@ pub struct PageFrame<'a> {
     pub plan: &'a Plan,
     /// World position of render space's origin, metres. All three coordinates must be finite.
     pub render_origin: DVec3,
-    /// How the casters differ from those of the last prepared frame. Pages in which casters moved
-    /// are drawn again.
+    /// How the casters differ from those of the last prepared frame, but for [`PageParts::moving`].
+    /// Pages in which casters moved are drawn again.
     pub casters: Casters<'a>,
+    /// How [`PageParts::moving`] differ from those of the last prepared frame. Pages in which they
+    /// moved are drawn again too: without those that stand still, if these are kept
+    /// [apart](crate::ShadowOptions::pages_apart).
+    pub moving: Casters<'a>,
     /// The depths of all receivers that the plan's camera sees: a view of the depth aspect alone,
     /// whose texture has the usage `TEXTURE_BINDING`. The picture lies at the upper left. Pixels
     /// without a surface have the depth of the far plane: 0 if depth is reversed, otherwise 1.
@@ -58,6 +66,9 @@ pub struct PageCounts {
     pub waiting: u32,
     /// Pages that were drawn, because they were new or because casters had moved.
     pub drawn: u32,
+    /// Those of them in which only what is kept [apart](crate::ShadowOptions::pages_apart) from
+    /// what stands still was drawn.
+    pub apart: u32,
     /// The pages that there is room for.
     pub room: u32,
     /// The [bias](umbrage::paged::Paging::bias) of levels that the frame had.
@@ -72,7 +83,7 @@ pub struct PageCounts {
 pub struct PagePool<'a> {
     /// Eight words for each place, of which the first is the index in the plan of the page's map, or
     /// `u32::MAX` if there is no page. Those at 5 and 6 are the frame in which the page was wanted
-    /// last, and 1 if it is out of date.
+    /// last, and what of it is out of date, or 0.
     pub places: &'a Buffer,
     /// Words: the one at 2 is the number of the frame, and the one at 3 says where those of the
     /// frames begin in which each place's page was drawn.
@@ -92,54 +103,153 @@ pub struct PreparedPages<'a> {
     pub(crate) render_origin: DVec3,
 }
 
+/// What casts into pages.
+#[derive(Default)]
+pub struct PageParts<'a> {
+    /// Clusters that stand still.
+    pub clusters: Option<PageClusters<'a>>,
+    /// Whole meshes that stand still.
+    pub still: Option<PageMeshPart<'a>>,
+    /// Whole meshes that move or are deformed.
+    pub moving: Option<PageMeshPart<'a>>,
+}
+
+/// The clusters that cast into pages.
+pub struct PageClusters<'a> {
+    /// What draws them.
+    pub casters: &'a mut PageCasters,
+    /// The clusters and their instances.
+    pub geometry: &'a ClusterGeometry,
+    /// The [mask](PageCasters::mask) of each batch of casters, `None` for those without holes, and
+    /// for all beyond the end.
+    pub masks: &'a [Option<&'a BindGroup>],
+}
+
+/// The whole meshes that cast into pages.
+pub struct PageMeshPart<'a> {
+    /// The meshes.
+    pub meshes: &'a mut PageMeshes,
+    /// Draws them, each once: sets pipelines and buffers, and calls [`PageMeshPass::draw`].
+    pub draw: &'a dyn Fn(&mut PageMeshPass<'_, '_>),
+}
+
+impl PageMeshPart<'_> {
+    /// Draws the meshes into a pass. Returns the number of draws.
+    fn encode(&self, pass: &mut RenderPass<'_>) -> u32 {
+        let mut pass = PageMeshPass { pass, meshes: &*self.meshes, draws: 0 };
+        (self.draw)(&mut pass);
+        pass.draws
+    }
+}
+
 impl PreparedPages<'_> {
-    /// Encodes the passes that find the pages which the frame wants, give them places, choose the
-    /// clusters that cast into those that are new or out of date, and draw these. Nothing comes
-    /// back from the device for it. `mask_of` gives the [mask](PageCasters::mask) of each batch of
-    /// casters, `None` for those without holes.
+    /// Encodes the passes that find the pages which the frame wants, give them places, find what
+    /// casts into those that are new or out of date, and draw these. Nothing comes back from the
+    /// device for it.
     ///
     /// Encode this behind the pass that draws the viewer's depths and ahead of those that look
     /// shadows up, and submit it before you prepare the next frame. Returns the number of draws.
     ///
     /// # Errors
     /// As for [`ClusterSelection::encode`](crate::ClusterSelection::encode).
-    #[expect(clippy::too_many_arguments, reason = "device, queue and encoder are one in spirit")]
-    pub fn encode<'m>(
+    pub fn encode(
         self,
         device: &Device,
         queue: &Queue,
         encoder: &mut CommandEncoder,
-        casters: &mut PageCasters,
-        geometry: &ClusterGeometry,
-        mask_of: impl Fn(u32) -> Option<&'m BindGroup>,
+        mut parts: PageParts<'_>,
         timestamps: PageTimestamps<'_>,
     ) -> Result<u32, Error> {
         let Self { shadows, plan, render_origin } = self;
-        let Some(pages) = &mut shadows.pages else { return Ok(0) };
+        let reach_texels = shadows.options.filter.reach_texels();
+        let Shadows { pages, texture, buffers, lookup_bind_group, .. } = shadows;
+        let Some(pages) = pages else { return Ok(0) };
         if plan.maps.is_empty() {
             return Ok(0);
         }
         let PageTimestamps { request, choice, depth } = timestamps;
-        pages.encode_request(encoder, &shadows.lookup_bind_group, request);
-        let reach = shadows.options.filter.reach_texels();
-        let maps = plan.maps.len() as u32;
-        let views =
-            (0..).zip(plan.maps.iter().zip(pages.levels())).map(|(map, (planned, level))| {
-                let (side, first) = (level.side, level.first);
-                let table = 4 * maps + level.table;
-                let own = PagesOfView { map, side, table, first, reach: reach as f32 + 1.0 };
-                ClusterView::of_pages(planned, own, render_origin, casters.share())
-            });
-        let views: Vec<_> = views.collect();
-        let Some(shown) = pages.shown_group(device, geometry) else { return Ok(0) };
-        casters.choose(device, queue, encoder, geometry, &views, render_origin, shown, choice)?;
-        let texture = &mut shadows.texture;
-        let mut pass = pages.begin_draw(encoder, texture, depth);
-        let draws = casters.draw(&mut pass, mask_of);
-        drop(pass);
-        texture.is_fresh = false;
+        pages.encode_request(encoder, lookup_bind_group, request);
+        let PageParts { clusters, still, moving } = &mut parts;
+        let choices = u32::from(clusters.is_some())
+            + u32::from(still.is_some())
+            + u32::from(moving.is_some());
+        let mut chosen = 0;
+        let mut next_times = || {
+            chosen += 1;
+            let all = choice.as_ref()?;
+            let (begin, end) = (all.beginning_of_pass_write_index, all.end_of_pass_write_index);
+            let begin = begin.filter(|_| chosen == 1);
+            let end = end.filter(|_| chosen == choices);
+            (begin.is_some() || end.is_some()).then_some(ComputePassTimestampWrites {
+                query_set: all.query_set,
+                beginning_of_pass_write_index: begin,
+                end_of_pass_write_index: end,
+            })
+        };
+        if let Some(clusters) = clusters {
+            let maps = plan.maps.len() as u32;
+            let share = clusters.casters.share();
+            let views =
+                (0..).zip(plan.maps.iter().zip(pages.levels())).map(|(map, (planned, level))| {
+                    let (side, first) = (level.side, level.first);
+                    let table = data::SHOWN * maps + level.table;
+                    let reach = reach_texels as f32 + 1.0;
+                    let own = PagesOfView { map, side, table, first, reach };
+                    ClusterView::of_pages(planned, own, render_origin, share)
+                });
+            let views: Vec<_> = views.collect();
+            let PageClusters { casters, geometry, .. } = clusters;
+            let Some(shown) = pages.shown_group(device, geometry) else { return Ok(0) };
+            let times = next_times();
+            casters.choose(
+                device,
+                queue,
+                encoder,
+                geometry,
+                &views,
+                render_origin,
+                shown,
+                times,
+            )?;
+        }
+        // Without a texture of their own, all that stands still is drawn where something moves.
+        for (part, is_still) in [(still, true), (moving, !pages.are_apart())] {
+            let (Some(part), Some(buffers)) = (part, pages.mesh_buffers(buffers.maps())) else {
+                continue;
+            };
+            let pages = MeshesIn { plan, render_origin, reach_texels, is_still, pages: buffers };
+            part.meshes.encode(device, queue, encoder, &pages, next_times());
+        }
+        let mut draws = 0;
+        let writes = |is_first, is_last| part(depth.as_ref(), is_first, is_last);
+        let are_apart = pages.are_apart();
+        {
+            let mut pass = pages.begin_draw(encoder, texture, writes(true, !are_apart));
+            if let Some(PageClusters { casters, masks, .. }) = &parts.clusters {
+                draws += casters.draw(&mut pass, masks);
+            }
+            let moving = parts.moving.as_ref().filter(|_| !are_apart);
+            for meshes in parts.still.iter().chain(moving) {
+                draws += meshes.encode(&mut pass);
+            }
+        }
+        if are_apart {
+            let mut pass = pages.begin_apart(encoder, texture, writes(false, true));
+            if let Some(meshes) = &parts.moving {
+                draws += meshes.encode(&mut pass);
+            }
+        }
+        pages.finish_draw(texture);
         Ok(draws)
     }
+}
+
+/// Checks that shadows have pages.
+pub(crate) fn check_pages(shadows: &Shadows) -> Result<&Pages, Error> {
+    shadows.pages.as_ref().ok_or_else(|| Error::Invalid {
+        field: "options.pages",
+        problem: "must be true for shadows whose pages are drawn, is false".into(),
+    })
 }
 
 impl Shadows {
@@ -155,8 +265,9 @@ impl Shadows {
         queue: &Queue,
         frame: &PageFrame<'a>,
     ) -> Result<PreparedPages<'a>, Error> {
-        let PageFrame { plan, render_origin, casters, depth, projection } = *frame;
+        let PageFrame { plan, render_origin, casters, moving, depth, projection } = *frame;
         self.check(plan, render_origin, casters)?;
+        check_casters(moving, "frame.moving")?;
         let Some(paging) = &plan.paging else {
             return Err(Error::Invalid {
                 field: "frame.plan",

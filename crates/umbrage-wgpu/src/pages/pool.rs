@@ -6,7 +6,7 @@ use crate::clusters::buffer;
 use crate::passes::depth_pass;
 use crate::readback::Readback;
 use crate::shadows::{Casters, DepthTexture, LookupParts, Shadows, depth_state};
-use crate::{ClusterGeometry, Layout, Support, wgsl};
+use crate::{ClusterGeometry, Layout, ShadowOptions, Support, wgsl};
 use glam::Vec2;
 use std::mem::size_of;
 use umbrage::paged::{Grid, PAGE_TEXELS, Paging};
@@ -16,8 +16,8 @@ use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
     BufferDescriptor, BufferUsages, CommandEncoder, CompareFunction, ComputePassDescriptor,
-    ComputePassTimestampWrites, ComputePipeline, ComputePipelineDescriptor, Device, LoadOp,
-    MultisampleState, PipelineCompilationOptions, PipelineLayout, PipelineLayoutDescriptor,
+    ComputePassTimestampWrites, ComputePipeline, ComputePipelineDescriptor, Device, FragmentState,
+    LoadOp, MultisampleState, PipelineCompilationOptions, PipelineLayout, PipelineLayoutDescriptor,
     PollType, PrimitiveState, Queue, RenderPass, RenderPassTimestampWrites, RenderPipeline,
     RenderPipelineDescriptor, ShaderModule, ShaderModuleDescriptor, ShaderSource, ShaderStages,
     TextureSampleType, TextureView, TextureViewDimension, VertexState,
@@ -47,6 +47,11 @@ pub(crate) struct Pages {
     /// What everything below was made for; `None` at first.
     key: Option<Key>,
     held: Option<Held>,
+    /// The depths of casters that stand still, if these are kept apart.
+    still: Option<DepthTexture>,
+    are_apart: bool,
+    /// The bind group of the texture of what stands still.
+    still_group: Option<BindGroup>,
     levels: Vec<Level>,
     /// The grids of the frame that was prepared last.
     grids: Vec<Grid>,
@@ -93,6 +98,9 @@ struct Pipelines {
     allocate: ComputePipeline,
     allocate_layout: BindGroupLayout,
     clear: RenderPipeline,
+    copy: RenderPipeline,
+    /// Of the texture of what stands still.
+    still_layout: BindGroupLayout,
     draw_layout: BindGroupLayout,
 }
 
@@ -136,7 +144,7 @@ impl Pages {
     pub(crate) fn new(
         device: &Device,
         support: &Support,
-        filter: &Filter,
+        options: &ShadowOptions,
         lookup_layout: &BindGroupLayout,
     ) -> Self {
         let uniform = |size: usize| {
@@ -149,7 +157,7 @@ impl Pages {
         };
         let bytes = 4 * STATE_WORDS as u64;
         Self {
-            pipelines: Pipelines::new(device, support, filter, lookup_layout),
+            pipelines: Pipelines::new(device, support, &options.filter, lookup_layout),
             uniforms: Uniforms {
                 frame: uniform(size_of::<data::Frame>()),
                 view: uniform(size_of::<data::View>()),
@@ -157,6 +165,9 @@ impl Pages {
             },
             key: None,
             held: None,
+            still: None,
+            are_apart: options.pages_apart,
+            still_group: None,
             levels: Vec::new(),
             grids: Vec::new(),
             grown: None,
@@ -274,6 +285,7 @@ impl Pages {
         texture: &DepthTexture,
         timestamps: Option<RenderPassTimestampWrites<'_>>,
     ) -> RenderPass<'e> {
+        let texture = self.still.as_ref().unwrap_or(texture);
         let load = if texture.is_fresh { LoadOp::Clear(1.0) } else { LoadOp::Load };
         let mut pass = depth_pass(encoder, &texture.layers[0], load, timestamps);
         if let (Some(held), Some(groups)) = (&self.held, &self.groups) {
@@ -284,6 +296,44 @@ impl Pages {
             }
         }
         pass
+    }
+
+    /// Begins the pass that draws what moves into pages, into which what stands still is copied.
+    pub(crate) fn begin_apart<'e>(
+        &self,
+        encoder: &'e mut CommandEncoder,
+        texture: &DepthTexture,
+        timestamps: Option<RenderPassTimestampWrites<'_>>,
+    ) -> RenderPass<'e> {
+        let load = if texture.is_fresh { LoadOp::Clear(1.0) } else { LoadOp::Load };
+        let mut pass = depth_pass(encoder, &texture.layers[0], load, timestamps);
+        if let (Some(held), Some(groups), Some(still)) =
+            (&self.held, &self.groups, &self.still_group)
+        {
+            pass.set_bind_group(0, &groups.draw, &[]);
+            pass.set_bind_group(1, still, &[]);
+            pass.set_pipeline(&self.pipelines.copy);
+            pass.draw_indirect(&held.calls, 16);
+        }
+        pass
+    }
+
+    /// Notes that pages were drawn.
+    pub(crate) fn finish_draw(&mut self, texture: &mut DepthTexture) {
+        texture.is_fresh = false;
+        if let Some(still) = &mut self.still {
+            still.is_fresh = false;
+        }
+    }
+
+    /// Whether casters that stand still have a texture of their own.
+    pub(crate) fn are_apart(&self) -> bool {
+        self.are_apart
+    }
+
+    /// The buffers by which meshes are listed for pages, of which `maps` is one.
+    pub(crate) fn mesh_buffers<'a>(&'a self, maps: &'a Buffer) -> Option<[&'a Buffer; 3]> {
+        self.held.as_ref().map(|held| [&held.levels, maps, &held.shown])
     }
 
     /// The layout of the bind group with which casters are drawn into pages.
@@ -318,6 +368,7 @@ impl Pages {
                     missing: words[data::MISSING],
                     waiting: words[data::WAITING],
                     drawn: words[data::FRESH],
+                    apart: words[data::APART],
                     room: pending.room,
                     bias,
                     bound: pending.error * bias.exp2(),
@@ -343,7 +394,7 @@ impl Shadows {
         frame: &PageFrame<'_>,
         paging: &Paging,
     ) {
-        let PageFrame { plan, render_origin, casters, depth, projection } = *frame;
+        let PageFrame { plan, render_origin, casters, moving, depth, projection } = *frame;
         let filter = self.options.filter;
         let place_side = place_side(&filter);
         let Self { pages, lookup, texture, buffers, support, .. } = self;
@@ -366,11 +417,9 @@ impl Shadows {
         );
         let mut rebind = buffers.hold(device, self.options.buffers, lookup);
         let (levels, table_words) = data::levels(paging);
-        let boxes = match casters {
-            Casters::MovedIn(boxes) => boxes,
-            Casters::Moved | Casters::Unmoved => &[],
-        };
-        let touched = pages.touched(plan, &levels, boxes, filter.reach_texels());
+        let still_boxes = boxes_of(casters);
+        let boxes: Vec<Aabb> = still_boxes.iter().chain(boxes_of(moving)).copied().collect();
+        let touched = pages.touched(plan, &levels, &boxes, filter.reach_texels());
         pages.levels = levels;
         pages.grids.clone_from(&paging.grids);
         let key = Key { places, levels: pages.levels.len(), table_words };
@@ -396,6 +445,7 @@ impl Shadows {
                 rebind = true;
             }
             texture.is_fresh = true;
+            pages.make_still(device, support, size);
         }
         if rebind {
             let parts = LookupParts { view: &texture.all, pages: pages.lookup_buffers() };
@@ -424,21 +474,28 @@ impl Shadows {
             }
             None => (plan.maps.len(), 1),
         };
+        let all_stale = match (casters, moving) {
+            (Casters::Moved, _) => data::STALE,
+            (_, Casters::Moved) if !pages.are_apart => data::STALE,
+            (_, Casters::Moved) => data::MOVED,
+            _ => 0,
+        };
         let shared = data::Frame {
             frame: pages.frame,
             places,
             room: held.room,
             boxes: boxes.len() as u32,
+            still_boxes: if pages.are_apart { still_boxes.len() } else { boxes.len() } as u32,
             error: paging.error as f32,
             least_bias: paging.bias as f32,
-            are_all_stale: (casters == Casters::Moved).into(),
+            all_stale,
             maps: plan.maps.len() as u32,
             groups: pages.workgroups,
             stamp: STAMPS.wrapping_mul(pages.frame),
             births: table_words,
             first_coming: first_coming as u32,
             frames_left,
-            padding: [0; 2],
+            padding: 0,
         };
         let view = data::View {
             base: projection.base as f32,
@@ -485,6 +542,23 @@ impl Pages {
             .collect()
     }
 
+    /// Makes a texture for what stands still, if that is kept apart.
+    fn make_still(&mut self, device: &Device, support: &Support, size: [u32; 2]) {
+        if !self.are_apart {
+            return;
+        }
+        let texture = DepthTexture::new(device, support, Layout::Atlas, size, 1);
+        self.still_group = Some(device.create_bind_group(&BindGroupDescriptor {
+            label: Some("shadow pages"),
+            layout: &self.pipelines.still_layout,
+            entries: &[BindGroupEntry {
+                binding: 0,
+                resource: BindingResource::TextureView(&texture.all),
+            }],
+        }));
+        self.still = Some(texture);
+    }
+
     /// Makes empty tables of so many words for the present levels. Pages that have places are entered
     /// when the frame begins.
     fn make_tables(&mut self, device: &Device, table_words: u32, places: u32) {
@@ -496,7 +570,7 @@ impl Pages {
         // Behind the table come the frames in which pages were drawn.
         held.table = stored(device, words(table_words + places), none);
         held.stamps = stored(device, words(table_words), none);
-        held.shown = stored(device, words(4 * levels + table_words), none);
+        held.shown = stored(device, words(data::SHOWN * levels + table_words), none);
         self.groups = None;
         self.seen = None;
     }
@@ -590,7 +664,7 @@ fn stored(device: &Device, bytes: usize, usage: BufferUsages) -> Buffer {
     })
 }
 
-fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> BindGroup {
+pub(super) fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> BindGroup {
     let entries = (0..).zip(buffers);
     let entries = entries
         .map(|(binding, buffer)| BindGroupEntry { binding, resource: buffer.as_entire_binding() });
@@ -601,7 +675,7 @@ fn group(device: &Device, layout: &BindGroupLayout, buffers: &[&Buffer]) -> Bind
     })
 }
 
-fn module(device: &Device, text: String) -> ShaderModule {
+pub(super) fn module(device: &Device, text: String) -> ShaderModule {
     device.create_shader_module(ShaderModuleDescriptor {
         label: Some("shadow pages"),
         source: ShaderSource::Wgsl(text.into()),
@@ -616,7 +690,7 @@ fn pipeline_layout(device: &Device, layouts: &[Option<&BindGroupLayout>]) -> Pip
     })
 }
 
-fn compute(
+pub(super) fn compute(
     device: &Device,
     module: &ShaderModule,
     layouts: &[Option<&BindGroupLayout>],
@@ -635,6 +709,42 @@ fn compute(
         compilation_options,
         cache: None,
     })
+}
+
+/// A layout of buffers.
+pub(super) fn buffers_layout(
+    device: &Device,
+    visibility: ShaderStages,
+    types: &[BufferBindingType],
+) -> BindGroupLayout {
+    let types: Vec<_> = types.iter().map(|&ty| of_buffer(ty)).collect();
+    bindings_layout(device, visibility, &types)
+}
+
+fn of_buffer(ty: BufferBindingType) -> BindingType {
+    BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+fn bindings_layout(
+    device: &Device,
+    visibility: ShaderStages,
+    types: &[BindingType],
+) -> BindGroupLayout {
+    let entries = (0..).zip(types);
+    let entries =
+        entries.map(|(binding, &ty)| BindGroupLayoutEntry { binding, visibility, ty, count: None });
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+        label: Some("shadow pages"),
+        entries: &entries.collect::<Vec<_>>(),
+    })
+}
+
+/// The boxes around casters that moved.
+fn boxes_of(casters: Casters<'_>) -> &[Aabb] {
+    match casters {
+        Casters::MovedIn(boxes) => boxes,
+        Casters::Moved | Casters::Unmoved => &[],
+    }
 }
 
 /// The pipeline that finds the triangles of clusters that pages show.
@@ -658,21 +768,6 @@ impl Pipelines {
         const UNIFORM: BufferBindingType = BufferBindingType::Uniform;
         const READ: BufferBindingType = BufferBindingType::Storage { read_only: true };
         const WRITTEN: BufferBindingType = BufferBindingType::Storage { read_only: false };
-        let of_buffer =
-            |ty| BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        let layout = |visibility: ShaderStages, types: &[BindingType]| {
-            let entries = (0..).zip(types);
-            let entries = entries.map(|(binding, &ty)| BindGroupLayoutEntry {
-                binding,
-                visibility,
-                ty,
-                count: None,
-            });
-            device.create_bind_group_layout(&BindGroupLayoutDescriptor {
-                label: Some("shadow pages"),
-                entries: &entries.collect::<Vec<_>>(),
-            })
-        };
         let request_layouts = [false, true].map(|multisampled| {
             let depths = BindingType::Texture {
                 sample_type: TextureSampleType::Depth,
@@ -680,14 +775,21 @@ impl Pipelines {
                 multisampled,
             };
             let others = [UNIFORM, WRITTEN, WRITTEN, WRITTEN].map(of_buffer);
-            layout(ShaderStages::COMPUTE, &[&[depths][..], &others].concat())
+            let types = [&[depths][..], &others].concat();
+            bindings_layout(device, ShaderStages::COMPUTE, &types)
         });
         let of_allocation = [
             UNIFORM, WRITTEN, READ, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, WRITTEN, READ,
             WRITTEN, WRITTEN, READ,
         ];
-        let allocate_layout = layout(ShaderStages::COMPUTE, &of_allocation.map(of_buffer));
-        let draw_layout = layout(ShaderStages::VERTEX, &[UNIFORM, READ, READ].map(of_buffer));
+        let allocate_layout = buffers_layout(device, ShaderStages::COMPUTE, &of_allocation);
+        let draw_layout = buffers_layout(device, ShaderStages::VERTEX, &[UNIFORM, READ, READ]);
+        let still = BindingType::Texture {
+            sample_type: TextureSampleType::Depth,
+            view_dimension: TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let still_layout = bindings_layout(device, ShaderStages::FRAGMENT, &[still]);
         let module = |text: String| module(device, text);
         let compute = |module: &_, layouts: &[Option<&BindGroupLayout>], entry_point| {
             compute(device, module, layouts, entry_point)
@@ -698,26 +800,39 @@ impl Pipelines {
             compute(&module, &[Some(own), Some(lookup_layout)], "shadow_page_request")
         });
         let allocation = module(wgsl::page_allocate());
-        let clearing = module(wgsl::page_clear(filter, support));
-        Self {
-            begin: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_begin"),
-            allocate: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_allocate"),
-            clear: device.create_render_pipeline(&RenderPipelineDescriptor {
+        let squares = |text: String, name: &str, layouts: &[Option<&BindGroupLayout>]| {
+            let module = module(text);
+            let fragment = format!("shadow_page_{name}_fragment");
+            device.create_render_pipeline(&RenderPipelineDescriptor {
                 label: Some("shadow pages"),
-                layout: Some(&pipeline_layout(device, &[Some(&draw_layout)])),
+                layout: Some(&pipeline_layout(device, layouts)),
                 vertex: VertexState {
-                    module: &clearing,
-                    entry_point: Some("shadow_page_clear_vertex"),
+                    module: &module,
+                    entry_point: Some(&format!("shadow_page_{name}_vertex")),
                     compilation_options: PipelineCompilationOptions::default(),
                     buffers: &[],
                 },
                 primitive: PrimitiveState::default(),
                 depth_stencil: Some(depth_state(CompareFunction::Always)),
                 multisample: MultisampleState::default(),
-                fragment: None,
+                // Without a fragment stage, squares have one depth.
+                fragment: (layouts.len() > 1).then_some(FragmentState {
+                    module: &module,
+                    entry_point: Some(&fragment),
+                    compilation_options: PipelineCompilationOptions::default(),
+                    targets: &[],
+                }),
                 multiview_mask: None,
                 cache: None,
-            }),
+            })
+        };
+        let own = Some(&draw_layout);
+        Self {
+            begin: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_begin"),
+            allocate: compute(&allocation, &[Some(&allocate_layout)], "shadow_page_allocate"),
+            clear: squares(wgsl::page_clear(filter, support), "clear", &[own]),
+            copy: squares(wgsl::page_copy(filter, support), "copy", &[own, Some(&still_layout)]),
+            still_layout,
             requests,
             request_layouts,
             allocate_layout,

@@ -92,6 +92,7 @@ fn variants() -> impl Iterator<Item = ShadowOptions> {
                     // The two ways differ in one function alone.
                     fades: filter == Filter::Hard || filter == Filter::None,
                     pages: false,
+                    pages_apart: false,
                 })
             })
         })
@@ -157,6 +158,9 @@ fn every_other_module_is_valid() {
         let support = Support { depth_clip_control, clip_distances, ..Support::FULL };
         for is_masked in [true, false] {
             validated(&mesh(&support, is_masked));
+            for filter in page_filters() {
+                validated(&page_mesh(&support, &filter, is_masked));
+            }
         }
         validated(&caster(3, &support));
         for layout in attribute_layouts() {
@@ -176,10 +180,12 @@ fn every_other_module_is_valid() {
             validated(&page_request(&filter, is_multisampled));
         }
         validated(&page_clear(&filter, &Support::FULL));
+        validated(&page_copy(&filter, &Support::FULL));
         validated(&page_triangles(&filter));
     }
     for text in [
         page_allocate(),
+        page_meshes(),
         cluster_descent(true),
         cluster_descent(false),
         cluster_draws(),
@@ -403,14 +409,43 @@ fn structs_of_pages_are_laid_out_alike() {
         &module,
         "ShadowPlacedPage",
         ours::PlacedPage,
-        [map, slab, index, slot, wanted, is_stale]
+        [map, slab, index, slot, wanted, stale]
     );
-    check_layout!(&module, "ShadowFreshPage", ours::FreshPage, [place, map, page, slot]);
+    check_layout!(&module, "ShadowFreshPage", ours::FreshPage, [place, map, page, slot, is_still]);
     check_layout!(
         &module,
         "ShadowPageFrame",
         ours::Frame,
-        [frame, places, room, boxes, error, least_bias, are_all_stale, maps, groups, stamp, births]
+        [
+            frame,
+            places,
+            room,
+            boxes,
+            still_boxes,
+            error,
+            least_bias,
+            all_stale,
+            groups,
+            maps,
+            stamp,
+            births,
+            first_coming,
+            frames_left
+        ]
+    );
+    let (module, _) = validated(&page_meshes());
+    check_layout!(
+        &module,
+        "ShadowPageMeshing",
+        ours::Meshing,
+        [meshes, draws, maps, room, reach, is_still, stride]
+    );
+    check_layout!(&module, "ShadowPageMesh", ours::PageMesh, [render_from_mesh, low, draw, high]);
+    check_layout!(
+        &module,
+        "ShadowPageMeshDraw",
+        ours::MeshDraw,
+        [first_index, index_count, base_vertex, first_map, end_map]
     );
     let (module, _) = validated(&page_request(&Filter::Hard, false));
     check_layout!(
@@ -519,6 +554,11 @@ fn shaders() -> Vec<Shader> {
     }
     shaders.push(page_allocate_shader());
     shaders.push(page_clear_shader(&Filter::Hard, &Support::FULL));
+    shaders.push(page_copy_shader(&Filter::Hard, &Support::FULL));
+    shaders.push(page_meshes_shader());
+    // WESL does not know how to clip.
+    let support = Support { clip_distances: false, ..Support::FULL };
+    shaders.extend([true, false].map(|m| page_mesh_shader(&support, &Filter::Hard, m)));
     shaders.push(page_triangles_shader(&Filter::Hard));
     shaders.extend([true, false].map(cluster_descent_shader));
     shaders.extend([cluster_draws_shader(), cluster_indices_shader()]);
