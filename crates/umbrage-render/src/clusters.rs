@@ -98,27 +98,79 @@ impl SceneClusters {
     }
 }
 
-/// Instances where they are now, in batches of these materials: see [`SceneClusters`].
+impl SceneClusters {
+    /// Clusters of the same meshes, with these instances alone.
+    pub(crate) fn with_moving(
+        &self,
+        gpu: &Gpu,
+        buffers: &SceneBuffers,
+        placed: &Placed,
+        members: &[usize],
+    ) -> Result<Self, Error> {
+        let instances = self.moving(buffers, placed, members);
+        let geometry = self.geometry.with_instances(gpu.device(), gpu.queue(), &instances)?;
+        let Self { materials, masked, opaque, .. } = self;
+        let (materials, masked) = (materials.clone(), masked.clone());
+        Ok(Self { geometry, materials, opaque: *opaque, masked })
+    }
+
+    /// Moves such instances to where they are now.
+    pub(crate) fn place_moving(
+        &mut self,
+        gpu: &Gpu,
+        buffers: &SceneBuffers,
+        placed: &Placed,
+        members: &[usize],
+    ) -> Result<(), Error> {
+        let instances = self.moving(buffers, placed, members);
+        Ok(self.geometry.place(gpu.queue(), &instances)?)
+    }
+
+    fn moving(
+        &self,
+        buffers: &SceneBuffers,
+        placed: &Placed,
+        members: &[usize],
+    ) -> Vec<ClusterInstance> {
+        let members = members.iter().map(|&k| &placed.instances[k]);
+        members.map(|d| instance(buffers, d, &self.materials, &self.masked)).collect()
+    }
+}
+
+/// Instances where they are now, in batches of these materials: see [`SceneClusters`]. Those that
+/// do not cast into pages as clusters that stand still do not cast.
 fn instances(
     buffers: &SceneBuffers,
     placed: &Placed,
     materials: &[usize],
     masked: &[usize],
 ) -> Vec<ClusterInstance> {
-    let place = |list: &[usize], material| list.iter().position(|&m| m == material);
     let instance = |(k, drawable): (usize, &Drawable)| {
-        let is_whole = placed.in_pages(k) != InPages::AsClusters;
-        let material = buffers.meshes[drawable.mesh].material;
-        let of_casters = place(masked, material).map_or(0, |i| 1 + i as u32);
-        let of_picture = place(materials, material).unwrap_or(0) as u32;
-        ClusterInstance {
-            mesh: drawable.mesh,
-            world_from_mesh: drawable.world_from_mesh,
-            caster_batch: (drawable.role.casts && !is_whole).then_some(of_casters),
-            seen_batch: drawable.role.is_seen.then_some(of_picture),
+        let instance = instance(buffers, drawable, materials, masked);
+        match placed.in_pages(k) {
+            InPages::AsClusters => instance,
+            _ => ClusterInstance { caster_batch: None, ..instance },
         }
     };
     placed.instances.iter().enumerate().map(instance).collect()
+}
+
+fn instance(
+    buffers: &SceneBuffers,
+    drawable: &Drawable,
+    materials: &[usize],
+    masked: &[usize],
+) -> ClusterInstance {
+    let place = |list: &[usize], material| list.iter().position(|&m| m == material);
+    let material = buffers.meshes[drawable.mesh].material;
+    let of_casters = place(masked, material).map_or(0, |i| 1 + i as u32);
+    let of_picture = place(materials, material).unwrap_or(0) as u32;
+    ClusterInstance {
+        mesh: drawable.mesh,
+        world_from_mesh: drawable.world_from_mesh,
+        caster_batch: drawable.role.casts.then_some(of_casters),
+        seen_batch: drawable.role.is_seen.then_some(of_picture),
+    }
 }
 
 /// A mesh's clusters in a space whose origin is `anchor`.

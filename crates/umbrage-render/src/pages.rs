@@ -2,7 +2,7 @@
 
 use crate::frame_target::FrameTarget;
 use crate::renderer::{Drawn, Renderer, Shading, compute_writes, depth_projection, writes};
-use crate::scene::SceneBuffers;
+use crate::scene::{MovingClusters, SceneBuffers};
 use crate::timer::{Stage, Timer};
 use crate::whole::{WholeCasters, draw_list};
 use crate::{Error, Gpu};
@@ -12,10 +12,13 @@ use umbrage_wgpu::{
     Casters, ClusterCasters, PageCasters, PageClusters, PageCounts, PageFrame, PageParts,
     PageTimestamps, Shadows,
 };
+use wgpu::Device;
 
 /// How a renderer draws pages.
 pub(crate) struct PageDrawing {
     casters: PageCasters,
+    /// Draws clusters that move, and which these are.
+    moving: Option<(Vec<usize>, PageCasters)>,
     whole: WholeCasters,
     /// The depths of the plan's camera.
     target: Option<FrameTarget>,
@@ -53,7 +56,21 @@ impl PageDrawing {
             problem: "needs a scene with clusters: see `SceneBuffers::make_pages`".into(),
         })??;
         let whole = WholeCasters::new(gpu.device(), scene, shadows)?;
-        Ok(Self { casters, whole, target: None, is_complete: true })
+        Ok(Self { casters, moving: None, whole, target: None, is_complete: true })
+    }
+}
+
+impl PageDrawing {
+    /// Draws these clusters that move from now on.
+    fn follow(&mut self, device: &Device, shadows: &Shadows, moved: Option<&MovingClusters>) {
+        let Some(MovingClusters { clusters, members }) = moved else {
+            self.moving = None;
+            return;
+        };
+        if self.moving.as_ref().is_none_or(|(known, _)| known != members) {
+            let casters = self.casters.for_instances(device, shadows, &clusters.geometry);
+            self.moving = Some((members.clone(), casters));
+        }
     }
 }
 
@@ -103,8 +120,10 @@ impl Renderer<'_> {
             let Self { shadows, masks, pages, .. } = self;
             let Some(drawing) = pages else { return Ok(Vec::new()) };
             let is_known = |drawing: &mut PageDrawing| {
-                let counts = drawing.casters.counts(device);
-                counts.is_none_or(|counts| counts.is_complete) && drawing.whole.counts(gpu).1
+                let moving = drawing.moving.as_mut().map(|(_, casters)| casters);
+                let mut clusters = std::iter::once(&mut drawing.casters).chain(moving);
+                clusters.all(|casters| casters.counts(device).is_none_or(|c| c.is_complete))
+                    && drawing.whole.counts(gpu).1
             };
             drawing.is_complete &= is_known(drawing);
             if !std::mem::replace(&mut drawing.is_complete, true) {
@@ -113,7 +132,6 @@ impl Renderer<'_> {
             let projection = depth_projection(scene, &camera)?;
             let depth = &target.depth;
             let frame = PageFrame { plan, render_origin: eye, casters, moving, depth, projection };
-            let prepared = shadows.prepare_pages(device, queue, &frame)?;
             let mut encoder = device.create_command_encoder(&Default::default());
             let mut begin = |stage| timer.as_ref().map(|t| t.begin(stage, &mut encoder));
             let [request, choice, depth] =
@@ -123,7 +141,10 @@ impl Renderer<'_> {
                 choice: compute_writes(&choice),
                 depth: writes(&depth),
             };
-            let PageDrawing { casters: own, whole, .. } = &mut *drawing;
+            let moved = scene.moving();
+            drawing.follow(device, shadows, moved.as_ref());
+            let prepared = shadows.prepare_pages(device, queue, &frame)?;
+            let PageDrawing { casters: own, moving: own_moving, whole, .. } = &mut *drawing;
             let ([still, moves], meshes) = whole.lists();
             let masks = &*masks;
             let draws = scene.with_page_clusters(|clusters, _| {
@@ -136,7 +157,14 @@ impl Renderer<'_> {
                             geometry: &clusters.geometry,
                             masks: &batches,
                         });
-                        let parts = PageParts { clusters, still, moving };
+                        let moving_clusters = own_moving.as_mut().zip(moved.as_ref());
+                        let moving_clusters =
+                            moving_clusters.map(|((_, casters), moved)| PageClusters {
+                                casters,
+                                geometry: &moved.clusters.geometry,
+                                masks: &batches,
+                            });
+                        let parts = PageParts { clusters, moving_clusters, still, moving };
                         prepared.encode(device, queue, &mut encoder, parts, timestamps)
                     })
                 })
@@ -167,8 +195,12 @@ impl Renderer<'_> {
             if is_exact && !(is_whole && has_room) && trials < MOST_TRIALS {
                 continue;
             }
-            let of_clusters = drawing.casters.counts(device).map_or(0, |counts| counts.triangles);
-            let triangles = of_clusters + drawing.whole.counts(gpu).0;
+            let of_clusters = |casters: &mut PageCasters| {
+                casters.counts(device).map_or(0, |counts| counts.triangles)
+            };
+            let of_moving = drawing.moving.as_mut().map_or(0, |(_, moving)| of_clusters(moving));
+            let of_still = of_clusters(&mut drawing.casters);
+            let triangles = of_still + of_moving + drawing.whole.counts(gpu).0;
             return Ok(vec![(0, Drawn { draws, triangles })]);
         }
     }

@@ -33,6 +33,8 @@ pub struct SceneBuffers {
     pub(crate) clusters: Option<SceneClusters>,
     /// The scene as clusters with all detail, from which pages are drawn if there are no others.
     finest: OnceLock<RwLock<SceneClusters>>,
+    /// The same of what moves.
+    moving: RwLock<Option<MovingClusters>>,
     /// Renderers share the buffers, so that a new pose reaches all of them.
     placed: RwLock<Placed>,
 }
@@ -55,6 +57,13 @@ pub(crate) struct Placed {
     bounds: Aabb,
 }
 
+/// Clusters of instances that move.
+pub(crate) struct MovingClusters {
+    pub(crate) clusters: SceneClusters,
+    /// The instances, in order.
+    pub(crate) members: Vec<usize>,
+}
+
 /// How an instance casts into pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum InPages {
@@ -62,8 +71,10 @@ pub(crate) enum InPages {
     AsClusters,
     /// As a whole mesh that stands still.
     Whole,
-    /// As a whole mesh that moves.
+    /// As clusters that move.
     Moving,
+    /// As a whole mesh that moves and changes its shape.
+    Deformed,
 }
 
 /// What poses did to an instance.
@@ -240,6 +251,7 @@ impl SceneBuffers {
             placed: RwLock::new(placed),
             clusters: None,
             finest: OnceLock::new(),
+            moving: RwLock::default(),
         };
         if let Some(clusters) = clusters.filter(|_| is_clustered) {
             buffers.clusters = SceneClusters::new(gpu, scene, &buffers, clusters)?;
@@ -274,6 +286,7 @@ impl SceneBuffers {
         })?;
         // Whoever came first has the same.
         let _ = self.finest.set(RwLock::new(clusters));
+        self.place_moving(gpu, &self.placed())?;
         gpu.check()
     }
 
@@ -330,11 +343,12 @@ impl SceneBuffers {
             let contents = bytemuck::cast_slice(&attributes);
             gpu.queue().write_buffer(&self.attributes, first * stride, contents);
         }
-        let known = placed.poses.len();
-        let casters = placed.move_instances(scene, &moved.instances);
-        if placed.poses.len() > known {
+        let known = placed.in_pages.clone();
+        let casters = placed.move_instances(scene, moved);
+        if placed.in_pages != known {
             self.place_finest(gpu, &placed)?;
         }
+        self.place_moving(gpu, &placed)?;
         gpu.check()?;
         Ok(casters)
     }
@@ -368,6 +382,34 @@ impl SceneBuffers {
     fn place_finest(&self, gpu: &Gpu, placed: &Placed) -> Result<(), Error> {
         let Some(finest) = self.finest.get() else { return Ok(()) };
         finest.write().unwrap_or_else(PoisonError::into_inner).place(gpu, self, placed)
+    }
+
+    /// Tells the clusters that move where they are.
+    fn place_moving(&self, gpu: &Gpu, placed: &Placed) -> Result<(), Error> {
+        let Some(finest) = self.finest.get() else { return Ok(()) };
+        let moves = |k: &usize| placed.in_pages[*k] == InPages::Moving;
+        let members: Vec<usize> = placed.poses.keys().copied().filter(moves).collect();
+        let mut moving = self.moving.write().unwrap_or_else(PoisonError::into_inner);
+        if members.is_empty() {
+            *moving = None;
+            return Ok(());
+        }
+        let finest = finest.read().unwrap_or_else(PoisonError::into_inner);
+        match &mut *moving {
+            Some(moving) if moving.members == members => {
+                moving.clusters.place_moving(gpu, self, placed, &members)
+            }
+            others => {
+                let clusters = finest.with_moving(gpu, self, placed, &members)?;
+                *others = Some(MovingClusters { clusters, members });
+                Ok(())
+            }
+        }
+    }
+
+    /// The clusters that move, if there are any.
+    pub(crate) fn moving(&self) -> RwLockReadGuard<'_, Option<MovingClusters>> {
+        self.moving.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Where the instances are.
@@ -428,21 +470,27 @@ impl Placed {
 
     /// Moves these instances to where the scene has them. Returns boxes around those that cast,
     /// before and after.
-    fn move_instances(&mut self, scene: &Scene, moved: &[usize]) -> Vec<Aabb> {
+    fn move_instances(&mut self, scene: &Scene, moved: &Moved) -> Vec<Aabb> {
         let mut casters = Vec::new();
         let version = self.version + 1;
-        for &i in moved {
+        for &i in &moved.instances {
             let Some(k) = self.drawable_of[i] else { continue };
             let new = Drawable::new(scene, i, &self.mesh_boxes);
+            let is_deformed = moved.meshes.contains(&new.mesh);
             let old = std::mem::replace(&mut self.instances[k as usize], new);
-            self.in_pages[k as usize] = InPages::Moving;
+            let in_pages = &mut self.in_pages[k as usize];
+            *in_pages = match *in_pages {
+                InPages::Deformed => InPages::Deformed,
+                _ if is_deformed => InPages::Deformed,
+                _ => InPages::Moving,
+            };
             let first = Pose { rest: old.bounds, version };
             self.poses.entry(k as usize).or_insert(first).version = version;
             let new = &self.instances[k as usize];
             let casting = [&old, new].into_iter().filter(|drawable| drawable.role.casts);
             casters.extend(casting.map(|drawable| drawable.bounds));
         }
-        if !moved.is_empty() {
+        if !moved.instances.is_empty() {
             self.version += 1;
             self.find_bounds();
         }

@@ -1,5 +1,5 @@
-//! Instances that cast into pages as whole meshes: those that poses moved or deformed, and those
-//! with triangles in whose plane a lamp lies.
+//! Instances that cast into pages as whole meshes: those that poses deformed, and those with
+//! triangles in whose plane a lamp lies.
 
 use crate::instances::EdgeOn;
 use crate::renderer::POSITIONS;
@@ -85,10 +85,10 @@ impl WholeCasters {
         let lists = |in_pages| match in_pages {
             InPages::Whole => true,
             InPages::AsClusters => is_all,
-            InPages::Moving => false,
+            InPages::Moving | InPages::Deformed => false,
         };
         self.still.add(scene, &placed, plan, edge_on, lists);
-        self.moving.add(scene, &placed, plan, &[], |in_pages| in_pages == InPages::Moving);
+        self.moving.add(scene, &placed, plan, &[], |in_pages| in_pages == InPages::Deformed);
     }
 
     /// Finds the boxes of what moved since it was drawn last.

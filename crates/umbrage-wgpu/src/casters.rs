@@ -17,7 +17,7 @@ use wgpu::{
 /// Draws instanced meshes, opaque or alpha-masked, into shadow maps. Each position is multiplied by
 /// its instance's matrix. The maps are the same on every device. For other meshes, such as skinned
 /// ones, write a vertex stage of your own (see [`Shadows::caster_wgsl`]).
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct MeshCasters {
     pipeline: RenderPipeline,
     mask_layout: Option<BindGroupLayout>,

@@ -85,7 +85,7 @@ pub(crate) struct View {
     pub(crate) page_table: u32,
     pub(crate) page_first: [i32; 2],
     pub(crate) page_reach: f32,
-    pub(crate) padding: u32,
+    pub(crate) page_still: u32,
 }
 
 /// `ShadowClusterDescent`.

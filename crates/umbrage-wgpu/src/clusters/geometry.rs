@@ -8,11 +8,11 @@ use umbrage_clusters::{Ball, ClusterMesh};
 use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferUsages,
-    ComputePipeline, ComputePipelineDescriptor, Device, PipelineCompilationOptions,
-    PipelineLayoutDescriptor, Queue, ShaderModuleDescriptor, ShaderSource, ShaderStages,
-    StorageTextureAccess, TextureFormat, TextureSampleType, TextureViewDescriptor,
-    TextureViewDimension,
+    BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
+    BufferDescriptor, BufferUsages, ComputePipeline, ComputePipelineDescriptor, Device,
+    PipelineCompilationOptions, PipelineLayoutDescriptor, Queue, ShaderModuleDescriptor,
+    ShaderSource, ShaderStages, StorageTextureAccess, TextureFormat, TextureSampleType,
+    TextureViewDescriptor, TextureViewDimension,
 };
 
 /// Meshes as clusters, and instances of them, on a device. Vertices stay in your own buffers.
@@ -93,7 +93,7 @@ pub struct AttributeLayout {
 }
 
 /// The pipelines that choose clusters.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pipelines {
     pub(crate) descend: ComputePipeline,
     /// `None` if the device has no pages.
@@ -186,7 +186,7 @@ impl ClusterGeometry {
         };
         let seen_batches = batches(|i| i.seen_batch);
         let caster_batches = batches(|i| i.caster_batch);
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
         let pipelines = Pipelines::new(device, support);
         Ok(Self {
             nodes: buffer(device, &lists.nodes, usage),
@@ -213,6 +213,51 @@ impl ClusterGeometry {
             nothing_hides: nothing_hides(device, &pipelines),
             pipelines,
             placements: 0,
+        })
+    }
+
+    /// Other instances of the same meshes, which share the clusters on the device. Their batches are
+    /// among those of this geometry's instances. So what moves can be
+    /// [placed](Self::place) in every frame without what stands still.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_instances(
+        &self,
+        device: &Device,
+        queue: &Queue,
+        instances: &[ClusterInstance],
+    ) -> Result<Self, Error> {
+        let placed = Placed::new(instances, &self.roots, self.mesh_nodes, None)?;
+        let node = size_of::<data::Node>() as u64;
+        let of_meshes = u64::from(self.mesh_nodes) * node;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+        let nodes = device.create_buffer(&BufferDescriptor {
+            label: Some("shadow clusters"),
+            size: of_meshes + placed.nodes.len() as u64 * node,
+            usage,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.nodes, 0, &nodes, 0, of_meshes);
+        queue.submit([encoder.finish()]);
+        queue.write_buffer(&nodes, of_meshes, bytemuck::cast_slice(&placed.nodes));
+        Ok(Self {
+            nodes,
+            clusters: self.clusters.clone(),
+            vertices: self.vertices.clone(),
+            triangles: self.triangles.clone(),
+            instances: buffer(device, &placed.data, usage),
+            positions: self.positions.clone(),
+            attributes: self.attributes.clone(),
+            origin: placed.origin,
+            rounds: placed.rounds + self.mesh_rounds,
+            instance_count: placed.data.len(),
+            roots: self.roots.clone(),
+            pipelines: self.pipelines.clone(),
+            nothing_hides: self.nothing_hides.clone(),
+            placements: 0,
+            ..*self
         })
     }
 

@@ -34,6 +34,8 @@ pub(crate) struct PagesOfView {
     pub(crate) first: [i32; 2],
     /// How far beyond a page its casters count, texels.
     pub(crate) reach: f32,
+    /// `STILL` of `pages/data.rs` if those pages count alone in which what stands still is drawn.
+    pub(crate) still: u32,
 }
 
 impl ClusterView {
@@ -178,7 +180,7 @@ impl ClusterView {
             page_table: self.pages.map_or(0, |pages| pages.table),
             page_first: self.pages.map_or([0; 2], |pages| pages.first),
             page_reach: self.pages.map_or(0.0, |pages| pages.reach),
-            padding: 0,
+            page_still: self.pages.map_or(0, |pages| pages.still),
         }
     }
 }

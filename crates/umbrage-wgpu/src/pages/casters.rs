@@ -61,6 +61,24 @@ impl PageCasters {
         })
     }
 
+    /// The same for [other instances](ClusterGeometry::with_instances) of the geometry's meshes, with
+    /// the same pipelines.
+    pub fn for_instances(
+        &self,
+        device: &Device,
+        shadows: &Shadows,
+        geometry: &ClusterGeometry,
+    ) -> Self {
+        Self {
+            inside: self.inside.clone(),
+            across: self.across.clone(),
+            selection: ClusterSelection::new(device, shadows.support(), geometry),
+            triangles: self.triangles.clone(),
+            share: self.share,
+            caster_batches: geometry.caster_batches,
+        }
+    }
+
     /// The part of a texel by which casters may be off.
     pub fn share(&self) -> f32 {
         self.share

@@ -5,11 +5,10 @@ pub(crate) mod data;
 pub(crate) mod meshes;
 mod pool;
 
-use crate::clusters::PagesOfView;
 use crate::passes::part;
 use crate::seen::check_depths;
 use crate::shadows::{Casters, Shadows, check_casters};
-use crate::{ClusterGeometry, ClusterView, DepthProjection, Error};
+use crate::{ClusterGeometry, DepthProjection, Error};
 pub use casters::PageCasters;
 use glam::DVec3;
 use meshes::MeshesIn;
@@ -29,10 +28,11 @@ pub struct PageFrame<'a> {
     pub plan: &'a Plan,
     /// World position of render space's origin, metres. All three coordinates must be finite.
     pub render_origin: DVec3,
-    /// How the casters differ from those of the last prepared frame, but for [`PageParts::moving`].
+    /// How the casters differ from those of the last prepared frame, but for those of
+    /// [`PageParts`] that move.
     /// Pages in which casters moved are drawn again.
     pub casters: Casters<'a>,
-    /// How [`PageParts::moving`] differ from those of the last prepared frame. Pages in which they
+    /// How the casters of [`PageParts`] that move differ from those of the last prepared frame. Pages in which they
     /// moved are drawn again too: without those that stand still, if these are kept
     /// [apart](crate::ShadowOptions::pages_apart).
     pub moving: Casters<'a>,
@@ -108,6 +108,8 @@ pub struct PreparedPages<'a> {
 pub struct PageParts<'a> {
     /// Clusters that stand still.
     pub clusters: Option<PageClusters<'a>>,
+    /// Clusters that move, [other instances](ClusterGeometry::with_instances) than the first.
+    pub moving_clusters: Option<PageClusters<'a>>,
     /// Whole meshes that stand still.
     pub still: Option<PageMeshPart<'a>>,
     /// Whole meshes that move or are deformed.
@@ -142,6 +144,18 @@ impl PageMeshPart<'_> {
     }
 }
 
+impl PageParts<'_> {
+    /// Draws what stands still, or what moves, into a pass. Returns the number of draws.
+    fn encode(&self, pass: &mut RenderPass<'_>, is_still: bool) -> u32 {
+        let (clusters, meshes) = match is_still {
+            true => (&self.clusters, &self.still),
+            false => (&self.moving_clusters, &self.moving),
+        };
+        let of_clusters = clusters.as_ref().map_or(0, |c| c.casters.draw(pass, c.masks));
+        of_clusters + meshes.as_ref().map_or(0, |meshes| meshes.encode(pass))
+    }
+}
+
 impl PreparedPages<'_> {
     /// Encodes the passes that find the pages which the frame wants, give them places, find what
     /// casts into those that are new or out of date, and draw these. Nothing comes back from the
@@ -169,36 +183,28 @@ impl PreparedPages<'_> {
         }
         let PageTimestamps { request, choice, depth } = timestamps;
         pages.encode_request(encoder, lookup_bind_group, request);
-        let PageParts { clusters, still, moving } = &mut parts;
-        let choices = u32::from(clusters.is_some())
-            + u32::from(still.is_some())
-            + u32::from(moving.is_some());
+        let are_apart = pages.are_apart();
+        let PageParts { clusters, moving_clusters, still, moving } = &mut parts;
+        let choices =
+            [clusters.is_some(), moving_clusters.is_some(), still.is_some(), moving.is_some()];
+        let choices = choices.into_iter().filter(|&is_there| is_there).count();
         let mut chosen = 0;
         let mut next_times = || {
             chosen += 1;
             let all = choice.as_ref()?;
-            let (begin, end) = (all.beginning_of_pass_write_index, all.end_of_pass_write_index);
-            let begin = begin.filter(|_| chosen == 1);
-            let end = end.filter(|_| chosen == choices);
+            let begin = all.beginning_of_pass_write_index.filter(|_| chosen == 1);
+            let end = all.end_of_pass_write_index.filter(|_| chosen == choices);
             (begin.is_some() || end.is_some()).then_some(ComputePassTimestampWrites {
                 query_set: all.query_set,
                 beginning_of_pass_write_index: begin,
                 end_of_pass_write_index: end,
             })
         };
-        if let Some(clusters) = clusters {
-            let maps = plan.maps.len() as u32;
-            let share = clusters.casters.share();
-            let views =
-                (0..).zip(plan.maps.iter().zip(pages.levels())).map(|(map, (planned, level))| {
-                    let (side, first) = (level.side, level.first);
-                    let table = data::SHOWN * maps + level.table;
-                    let reach = reach_texels as f32 + 1.0;
-                    let own = PagesOfView { map, side, table, first, reach };
-                    ClusterView::of_pages(planned, own, render_origin, share)
-                });
-            let views: Vec<_> = views.collect();
-            let PageClusters { casters, geometry, .. } = clusters;
+        // Without a texture of their own, all that stands still is drawn where something moves.
+        for (part, is_still) in [(clusters, true), (moving_clusters, !are_apart)] {
+            let Some(PageClusters { casters, geometry, .. }) = part else { continue };
+            let still = if is_still { data::STILL } else { 0 };
+            let views = pages.views(plan, render_origin, reach_texels, casters.share(), still);
             let Some(shown) = pages.shown_group(device, geometry) else { return Ok(0) };
             let times = next_times();
             casters.choose(
@@ -212,8 +218,7 @@ impl PreparedPages<'_> {
                 times,
             )?;
         }
-        // Without a texture of their own, all that stands still is drawn where something moves.
-        for (part, is_still) in [(still, true), (moving, !pages.are_apart())] {
+        for (part, is_still) in [(still, true), (moving, !are_apart)] {
             let (Some(part), Some(buffers)) = (part, pages.mesh_buffers(buffers.maps())) else {
                 continue;
             };
@@ -222,22 +227,16 @@ impl PreparedPages<'_> {
         }
         let mut draws = 0;
         let writes = |is_first, is_last| part(depth.as_ref(), is_first, is_last);
-        let are_apart = pages.are_apart();
         {
             let mut pass = pages.begin_draw(encoder, texture, writes(true, !are_apart));
-            if let Some(PageClusters { casters, masks, .. }) = &parts.clusters {
-                draws += casters.draw(&mut pass, masks);
-            }
-            let moving = parts.moving.as_ref().filter(|_| !are_apart);
-            for meshes in parts.still.iter().chain(moving) {
-                draws += meshes.encode(&mut pass);
+            draws += parts.encode(&mut pass, true);
+            if !are_apart {
+                draws += parts.encode(&mut pass, false);
             }
         }
         if are_apart {
             let mut pass = pages.begin_apart(encoder, texture, writes(false, true));
-            if let Some(meshes) = &parts.moving {
-                draws += meshes.encode(&mut pass);
-            }
+            draws += parts.encode(&mut pass, false);
         }
         pages.finish_draw(texture);
         Ok(draws)

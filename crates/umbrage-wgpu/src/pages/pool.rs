@@ -2,16 +2,16 @@
 
 use super::data::{self, Level, STATE_WORDS};
 use super::{PageCounts, PageFrame, PagePool};
-use crate::clusters::buffer;
+use crate::clusters::{PagesOfView, buffer};
 use crate::passes::depth_pass;
 use crate::readback::Readback;
 use crate::shadows::{Casters, DepthTexture, LookupParts, Shadows, depth_state};
-use crate::{ClusterGeometry, Layout, ShadowOptions, Support, wgsl};
-use glam::Vec2;
+use crate::{ClusterGeometry, ClusterView, Layout, ShadowOptions, Support, wgsl};
+use glam::{DVec3, Vec2};
 use std::mem::size_of;
 use umbrage::paged::{Grid, PAGE_TEXELS, Paging};
 use umbrage::visibility::Filter;
-use umbrage::{Aabb, Place};
+use umbrage::{Aabb, Place, Plan};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType,
@@ -188,9 +188,29 @@ impl Pages {
         self.held.as_ref().map(|held| [&held.levels, &held.table])
     }
 
-    /// The levels of the plan's maps.
-    pub(crate) fn levels(&self) -> &[Level] {
-        &self.levels
+    /// The views of a plan's maps, for clusters that may be off by a share of a texel.
+    pub(crate) fn views(
+        &self,
+        plan: &Plan,
+        render_origin: DVec3,
+        reach_texels: u32,
+        share: f32,
+        still: u32,
+    ) -> Vec<ClusterView> {
+        let entries = data::SHOWN * plan.maps.len() as u32;
+        let maps = (0..).zip(plan.maps.iter().zip(&self.levels));
+        let view = |(map, (planned, level)): (u32, (&umbrage::ShadowMap, &Level))| {
+            let own = PagesOfView {
+                map,
+                side: level.side,
+                table: entries + level.table,
+                first: level.first,
+                reach: reach_texels as f32 + 1.0,
+                still,
+            };
+            ClusterView::of_pages(planned, own, render_origin, share)
+        };
+        maps.map(view).collect()
     }
 
     /// What lies in the texture.
@@ -530,13 +550,7 @@ impl Shadows {
 
 impl Pages {
     /// For each map and box the pages that the box's shadow may touch.
-    fn touched(
-        &self,
-        plan: &umbrage::Plan,
-        levels: &[Level],
-        boxes: &[Aabb],
-        reach: u32,
-    ) -> Vec<[i32; 4]> {
+    fn touched(&self, plan: &Plan, levels: &[Level], boxes: &[Aabb], reach: u32) -> Vec<[i32; 4]> {
         let maps = plan.maps.iter().zip(levels);
         maps.flat_map(|(map, level)| boxes.iter().map(|&b| data::touched(map, level, b, reach)))
             .collect()

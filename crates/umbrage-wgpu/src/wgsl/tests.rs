@@ -350,7 +350,8 @@ fn structs_of_clusters_are_laid_out_alike() {
                         page_side,
                         page_table,
                         page_first,
-                        page_reach
+                        page_reach,
+                        page_still
                     ]
                 ),
             ),
