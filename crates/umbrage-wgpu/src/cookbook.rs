@@ -13,6 +13,7 @@
 //! | maps fitted to what the camera sees | [`fit_to_seen`] |
 //! | to follow the size of a window | [`resizing`] |
 //! | models of millions of triangles, at a cost that follows texels | [`huge_models`] |
+//! | shadows that stand still, with a bound on every texel's width | [`pages`] |
 //!
 //! # Hidden fragments
 //!
@@ -158,3 +159,15 @@ pub mod fit_to_seen {}
 #[doc = include_str!("../cookbook/huge_models.rs")]
 #[doc = "```"]
 pub mod huge_models {}
+
+/// [Paged maps](umbrage::paged) are drawn from the viewer's depths, which need a pass ahead of the
+/// shading. These have whole meshes as casters, of which those that move are kept apart, and lights
+/// that move are looked up where they were a while ago. Clusters are faster for all that is larger
+/// than a page: see [`PageClusters`](crate::PageClusters). Where a device has no pages
+/// ([`Support::pages`](crate::Support::pages)), take what
+/// [`Support::instead_of_pages`](crate::Support::instead_of_pages) gives.
+///
+#[doc = "```"]
+#[doc = include_str!("../cookbook/pages.rs")]
+#[doc = "```"]
+pub mod pages {}

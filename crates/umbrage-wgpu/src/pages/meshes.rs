@@ -80,10 +80,15 @@ pub struct PageMeshPass<'p, 'e> {
     /// vertex buffers and the index buffer, and leave the other bind groups as they are.
     pub pass: &'p mut RenderPass<'e>,
     pub(super) meshes: &'p PageMeshes,
-    pub(super) draws: u32,
+    pub(super) drawn: u32,
 }
 
 impl PageMeshPass<'_, '_> {
+    /// The number of draws.
+    pub fn draws(&self) -> u32 {
+        self.meshes.draws()
+    }
+
     /// Draws with the number that [`PageMeshes::add`] gave: indirectly, so that a draw without
     /// instances costs little.
     pub fn draw(&mut self, draw: u32) {
@@ -92,7 +97,7 @@ impl PageMeshPass<'_, '_> {
             let offset = draw * self.meshes.stride;
             self.pass.set_bind_group(wgsl::PAGE_MESH_GROUP, &buffers.draw_group, &[offset]);
             self.pass.draw_indexed_indirect(&buffers.calls, u64::from(draw) * 20);
-            self.draws += 1;
+            self.drawn += 1;
         }
     }
 }

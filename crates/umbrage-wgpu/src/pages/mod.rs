@@ -138,9 +138,9 @@ pub struct PageMeshPart<'a> {
 impl PageMeshPart<'_> {
     /// Draws the meshes into a pass. Returns the number of draws.
     fn encode(&self, pass: &mut RenderPass<'_>) -> u32 {
-        let mut pass = PageMeshPass { pass, meshes: &*self.meshes, draws: 0 };
+        let mut pass = PageMeshPass { pass, meshes: &*self.meshes, drawn: 0 };
         (self.draw)(&mut pass);
-        pass.draws
+        pass.drawn
     }
 }
 

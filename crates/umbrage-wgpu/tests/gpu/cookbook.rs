@@ -14,6 +14,8 @@ mod fit_to_seen;
 #[path = "../../cookbook/huge_models.rs"]
 mod huge_models;
 pub(crate) mod kitchen;
+#[path = "../../cookbook/pages.rs"]
+mod pages;
 #[path = "../../cookbook/resizing.rs"]
 mod resizing;
 #[path = "../../cookbook/shadow_distance.rs"]
@@ -165,6 +167,70 @@ fn huge_models_cast_in_levels_of_detail() {
         kitchen
             .check(&picture, &camera(), |p| kitchen::box_hides(DVec3::ZERO, p, -sun_direction()));
     }
+}
+
+/// Whole meshes cast into pages. One box stands, another walks, and the sun turns; what is shown is
+/// the sun of a while ago, and no page is drawn again that nothing moved in.
+#[needs(gpu)]
+#[test]
+fn pages_of_whole_meshes() {
+    let walker = |frame: u32| DVec3::new(0.05 * f64::from(frame) - 2.5, 0.0, 2.0);
+    let pillar = DVec3::new(0.5, 0.0, -1.0);
+    let kitchen = Kitchen::new(&[plain(), box_at(pillar), box_at(DVec3::ZERO)]);
+    let bench = &kitchen.bench;
+    let (device, queue) = (&bench.device, &bench.queue);
+    let corners = [plain(), box_at(pillar), box_at(DVec3::ZERO)].map(|mesh| mesh.len() as u32);
+    let indices: Vec<u32> = (0..corners.iter().sum()).collect();
+    let indices = bench.buffer(cast_slice(&indices), BufferUsages::INDEX);
+    let model = |part: usize, at: DVec3, mesh: Vec<Vec3>| {
+        let first: u32 = corners[..part].iter().sum();
+        pages::Model {
+            indices: first..first + corners[part],
+            world_from_mesh: DAffine3::from_translation(at),
+            bounds: Aabb::around(mesh.into_iter().map(|p| p.as_dvec3() + at)),
+        }
+    };
+    let still = [model(0, DVec3::ZERO, plain()), model(1, DVec3::ZERO, box_at(pillar))];
+    let technique = technique("paged:pcf2");
+    let layout = kitchen::POSITIONS;
+    let mut paged =
+        pages::PagedShadows::new(device, bench.support, technique, layout, &still).unwrap();
+    let shader = kitchen::shader("shadow_visibility");
+    let pipeline = kitchen.pipeline(&paged.shadows, &shader);
+    let projection = kitchen::clip_from_view().as_dmat4();
+    let projection = umbrage_wgpu::DepthProjection::of_matrix(projection).unwrap();
+    let direction =
+        |frame: u32| glam::DQuat::from_rotation_y(2e-3 * f64::from(frame)) * sun_direction();
+    let mut all = Vec::new();
+    for frame in 0..70 {
+        let sun = Light::Directional { direction: direction(frame) };
+        // The walker stops at last, and so does the sun.
+        let at = walker(frame.min(50));
+        let moving = [model(2, at, box_at(DVec3::ZERO))];
+        let (_, depths) = kitchen.shade_and_keep_depths(&paged.shadows, &pipeline, &camera());
+        let mut encoder = bench.encoder();
+        let seen = (&depths, projection);
+        let scene = (&camera(), &[sun][..], &moving[..]);
+        let buffers = (kitchen.vertices(), &indices);
+        paged.draw((device, queue), &mut encoder, scene, seen, buffers).unwrap();
+        bench.finish(encoder);
+        let counts = paged.shadows.page_counts(device).unwrap();
+        all.push(counts);
+        if frame % 17 == 3 {
+            // The sun begins to turn in frame 1, and its pages are renewed over 30 frames.
+            let renewals = frame.saturating_sub(1) / 30;
+            let shown = if renewals == 0 { 0 } else { 30 * (renewals - 1) + 1 };
+            let picture = kitchen.shade(&paged.shadows, &pipeline, &camera());
+            kitchen.check(&picture, &camera(), |p| {
+                let towards = -direction(shown);
+                kitchen::box_hides(pillar, p, towards) || kitchen::box_hides(at, p, towards)
+            });
+        }
+    }
+    // Once the pool is as large as it must be, few pages are drawn in a frame.
+    assert!(all[0].drawn == all[0].wanted, "{:?}", all[0]);
+    assert!(all[10..].iter().all(|c| c.missing == 0 && c.drawn * 2 < c.wanted), "{all:?}");
+    assert!(all[10..50].iter().all(|c| c.apart > 0), "{all:?}");
 }
 
 #[needs(gpu)]

@@ -224,6 +224,10 @@ impl Kitchen {
         planner.plan(&camera(), lights, &self.bounds(), technique).unwrap().clone()
     }
 
+    pub(crate) fn vertices(&self) -> &wgpu::Buffer {
+        &self.vertices
+    }
+
     pub(crate) fn casters(&self, shadows: &Shadows) -> MeshCasters {
         let layouts = [Some(POSITIONS), Some(CasterInstance::LAYOUT)];
         MeshCasters::new(&self.bench.device, shadows, MeshKind::Opaque, &layouts)
@@ -522,7 +526,7 @@ impl Kitchen {
     }
 }
 
-const POSITIONS: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+pub(crate) const POSITIONS: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: 12,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x3],
