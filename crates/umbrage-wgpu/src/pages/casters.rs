@@ -1,4 +1,4 @@
-use super::pool::triangles_pipeline;
+use super::pipelines::triangles_pipeline;
 use super::{Pages, check_pages};
 use crate::clusters::{ForPages, check_share};
 use crate::{

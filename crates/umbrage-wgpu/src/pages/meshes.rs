@@ -1,7 +1,7 @@
 //! Whole meshes that cast into pages.
 
 use super::data::{self, MeshDraw, Meshing};
-use super::pool::{buffers_layout, compute, group, module};
+use super::pipelines::{buffers_layout, compute, group, module};
 use crate::readback::Readback;
 use crate::{CasterInstance, Error, Shadows, wgsl};
 use glam::{DAffine3, DVec3};

@@ -3,6 +3,7 @@
 mod casters;
 pub(crate) mod data;
 pub(crate) mod meshes;
+mod pipelines;
 mod pool;
 
 use crate::passes::part;
