@@ -23,7 +23,7 @@ pub(crate) struct PageDrawing {
     /// The depths of the plan's camera.
     target: Option<FrameTarget>,
     /// Whether the pages were drawn whole, as far as is known.
-    is_complete: bool,
+    pub(crate) is_complete: bool,
 }
 
 /// How often pages are found anew, with more room each time, until all of them have some.
@@ -56,7 +56,8 @@ impl PageDrawing {
             problem: "needs a scene with clusters: see `SceneBuffers::make_pages`".into(),
         })??;
         let whole = WholeCasters::new(gpu.device(), scene, shadows)?;
-        Ok(Self { casters, moving: None, whole, target: None, is_complete: true })
+        // What other casters drew before is out of date.
+        Ok(Self { casters, moving: None, whole, target: None, is_complete: false })
     }
 }
 

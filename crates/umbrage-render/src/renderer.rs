@@ -277,7 +277,12 @@ impl<'g> Renderer<'g> {
         timer: Option<&mut Timer>,
     ) -> Result<Vec<(usize, Drawn)>, Error> {
         if plan.paging.is_some() {
-            return self.draw_pages(eye, plan, casters, timer);
+            let drawn = self.draw_pages(eye, plan, casters, timer);
+            if let (Err(_), Some(pages)) = (&drawn, &mut self.pages) {
+                // What has moved since is not known any more.
+                pages.is_complete = false;
+            }
+            return drawn;
         }
         if self.clusters.is_some() && self.edge_on.is_empty() {
             return self.draw_clusters(eye, plan, casters, timer);

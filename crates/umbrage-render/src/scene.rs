@@ -308,7 +308,8 @@ impl SceneBuffers {
     /// boxes around the casters that changed, before and after, world space, metres: pass them to
     /// the next [`Renderer::draw_maps`](crate::Renderer::draw_maps) of each renderer, as
     /// [`Casters::MovedIn`](umbrage_wgpu::Casters::MovedIn). What every pose moved must be passed
-    /// on, and the boxes of several poses between two draws count together.
+    /// on, and the boxes of several poses between two draws count together. Renderers of plans with
+    /// pages find all that by themselves, and need no boxes.
     ///
     /// # Errors
     /// The scene is not the one that was uploaded, it was uploaded with clusters and something
