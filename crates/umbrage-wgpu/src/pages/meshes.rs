@@ -226,6 +226,21 @@ impl PageMeshes {
         self.draws.len() as u32
     }
 
+    /// Checks that all meshes are somewhere.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let is_sound = |mesh: &PageMesh| {
+            let Aabb { min, max } = mesh.bounds;
+            mesh.world_from_mesh.is_finite() && min.is_finite() && max.is_finite()
+        };
+        match self.meshes.iter().find(|mesh| !is_sound(mesh)) {
+            Some(bad) => Err(Error::Invalid {
+                field: "parts.meshes",
+                problem: format!("must have finite transforms and boxes, but one has {bad:?}"),
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// What became of the meshes of the newest frame that the device has told of. Where it was not
     /// complete, casters are missing from pages: draw them again with
     /// [`Casters::Moved`](crate::Casters::Moved). This does not wait for the device.

@@ -166,7 +166,8 @@ impl PreparedPages<'_> {
     /// shadows up, and submit it before you prepare the next frame. Returns the number of draws.
     ///
     /// # Errors
-    /// As for [`ClusterSelection::encode`](crate::ClusterSelection::encode).
+    /// As for [`ClusterSelection::encode`](crate::ClusterSelection::encode), and [`Error::Invalid`]
+    /// if a whole mesh has a transform or a box that is not finite.
     pub fn encode(
         self,
         device: &Device,
@@ -181,6 +182,9 @@ impl PreparedPages<'_> {
         let Some(pages) = pages else { return Ok(0) };
         if plan.maps.is_empty() {
             return Ok(0);
+        }
+        for part in parts.still.iter().chain(&parts.moving) {
+            part.meshes.check()?;
         }
         let PageTimestamps { request, choice, depth } = timestamps;
         pages.encode_request(encoder, lookup_bind_group, request);

@@ -227,6 +227,19 @@ fn pages_of_whole_meshes() {
             });
         }
     }
+    // What is nowhere is refused.
+    let mut nowhere = model(2, DVec3::ZERO, box_at(DVec3::ZERO));
+    nowhere.world_from_mesh.translation.x = f64::NAN;
+    let seen = kitchen.shade_and_keep_depths(&paged.shadows, &pipeline, &camera()).1;
+    let refused = paged.draw(
+        (device, queue),
+        &mut bench.encoder(),
+        (&camera(), &[SUN], &[nowhere]),
+        (&seen, projection),
+        (kitchen.vertices(), &indices),
+    );
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("parts.meshes"), "{refused}");
     // Once the pool is as large as it must be, few pages are drawn in a frame.
     assert!(all[0].drawn == all[0].wanted, "{:?}", all[0]);
     assert!(all[10..].iter().all(|c| c.missing == 0 && c.drawn * 2 < c.wanted), "{all:?}");
